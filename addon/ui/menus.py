@@ -10,6 +10,7 @@ import rna_keymap_ui
 
 from ..blender.preview import previews
 from ..blender.properties.presets import shipped_presets
+from ..blender.properties.properties import TRANSLATION_CONTEXT
 from .drawing import draw_overlays
 from .operators_card_edits import draw_menu
 from .operators_strand_export import draw_strand_exports
@@ -49,7 +50,10 @@ class HAIRLOOM_MT_looks(bpy.types.Menu):
     def draw(self, _context: bpy.types.Context) -> None:
         for entry in shipped_presets("shading"):
             operator = self.layout.operator(
-                "hairloom.apply_preset", text=entry.title, icon_value=entry.icon
+                "hairloom.apply_preset",
+                text=entry.title,
+                text_ctxt=TRANSLATION_CONTEXT,
+                icon_value=entry.icon,
             )
             operator.name = entry.name
 

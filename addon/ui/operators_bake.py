@@ -20,6 +20,7 @@ from .long_work import LongWork, Steps, can_start, counted, draw_progress
 from .operators_measure import draw_figures
 from .reports import reporting
 from .selection import chosen_hair
+from .texts import translated
 
 
 class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
@@ -133,20 +134,28 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         column.prop(obj.hairloom.bake, "is_shown")
     facts = None if cache is None else cache.facts
     if facts is None:
-        layout.label(text=problem or "Not baked", icon="ERROR" if problem else "BLANK1")
+        text = problem or translated("Not baked")
+        layout.label(text=text, icon="ERROR" if problem else "BLANK1", translate=False)
     else:
         device = {"numpy": "CPU", "compute": "GPU"}.get(facts.device, facts.device)
         layout.label(
-            text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {device}",
+            text=translated(
+                "Frames {first} to {last} at {rate:g} fps, {device}",
+                first=facts.first,
+                last=facts.last,
+                rate=facts.frame_rate,
+                device=device,
+            ),
             icon="CHECKMARK",
+            translate=False,
         )
     if obj.type == "CURVES":  # cloth is not measured
         figures = None if facts is None else facts.figures
         draw_figures(layout.column(align=True), table_of(figures))
     preview_bake = previews.bake_of(obj)
     changed = () if facts is None or preview_bake is None else preview_bake.changed_inputs
-    text = f"Changed since: {phrase_of(changed)}" if changed else ""
-    layout.label(text=text, icon="ERROR" if changed else "BLANK1")
+    text = translated("Changed since: {inputs}", inputs=phrase_of(changed)) if changed else ""
+    layout.label(text=text, icon="ERROR" if changed else "BLANK1", translate=False)
 
 
 class _FinBake(WithHelp):

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..blender.base.outcome import Outcome, report
-from ..blender.cards.build import counts_line, order_line
+from ..blender.cards.build import counts_line
 from ..blender.cards.edits import read_edits
 from ..blender.cards.made_objects import card_objects
 from ..blender.cards.object import CardObjectJob
@@ -19,6 +19,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import report_outcome
 from .selection import chosen_hair, in_object_mode, needs_hair
+from .texts import translated
 
 #: number of levels of detail in a panel: the most that there may be
 _MAX_LEVELS = next(
@@ -115,14 +116,16 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     finest = objects[0] if objects else None
     card_object = finest and finest.hairloom.card_object
     column = layout.column(align=True)
-    column.label(text=_counts(finest) if finest else "No cards yet", icon="OUTLINER_OB_MESH")
+    counts = _translated_counts(finest) if finest else translated("No cards yet")
+    column.label(text=counts, icon="OUTLINER_OB_MESH", translate=False)
     _draw_levels(column, objects)
-    column.label(
-        text=order_line(card_object.wrong_fraction) if card_object else "", icon="SORTSIZE"
-    )
+    percent = 100.0 * card_object.wrong_fraction if card_object else 0.0
+    order = translated("{percent:.0f} % of pixels blend in the wrong order", percent=percent)
+    column.label(text=order if card_object else "", icon="SORTSIZE", translate=False)
     image = card_object and card_object.image
     size = f"{image.size[0]} x {image.size[1]}" if image else "-"
-    column.label(text=f"Texture {size}", icon="TEXTURE")
+    texture = translated("Texture {size}", size=size)
+    column.label(text=texture, icon="TEXTURE", translate=False)
 
 
 def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]) -> None:
@@ -140,6 +143,15 @@ def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]
 def _short_count(count: int) -> str:
     """A number in at most four characters, such as "37k"."""
     return f"{count:,}" if count < 1000 else f"{count / 1000.0:.0f}k"
+
+
+def _translated_counts(obj: bpy.types.Object) -> str:
+    card_object = obj.hairloom.card_object
+    if card_object.shell_layers:
+        things = translated("{count} layers of shells", count=card_object.shell_layers)
+    else:
+        things = translated("{count:,} cards", count=card_object.card_count)
+    return f"{things}, {translated('{count:,} triangles', count=len(obj.data.polygons))}"
 
 
 def _counts(obj: bpy.types.Object) -> str:

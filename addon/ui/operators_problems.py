@@ -9,6 +9,7 @@ from ..blender.preview import previews
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 from .state import draw_problems, problems_of
+from .texts import translated
 
 #: width of the popup, in pixels at UI scale 1
 _WIDTH = 360
@@ -38,7 +39,8 @@ class HAIRLOOM_OT_show_problems(bpy.types.Operator):
 
     def draw(self, context: bpy.types.Context) -> None:
         hair = chosen_hair(context)[0]
-        self.layout.label(text=f"{hair.name}: problems")
+        title = translated("{name}: problems", name=hair.name)
+        self.layout.label(text=title, translate=False)
         draw_problems(self.layout, context, hair, previews.session_of(hair), _WIDTH)
 
 

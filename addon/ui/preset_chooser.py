@@ -9,6 +9,7 @@ import bpy
 from bpy.props import EnumProperty, PointerProperty
 
 from ..blender.properties.presets import Entry, matching_preset, own_presets, shipped_presets
+from ..blender.properties.properties import TRANSLATION_CONTEXT
 from ..blender.scene.curves import COLOR_ATTRIBUTE
 from ..blender.scene.principled import has_principled_hair
 from .messages import draw_message
@@ -31,7 +32,7 @@ KIND = EnumProperty(
 #: scale of the picture in the panel, and of those in the popup
 _SCALE, _POPUP_SCALE = 3.0, 5.0
 #: enum item for hair that matches no preset; its number is 0, presets count from 1
-_CUSTOM = ("CUSTOM", "Custom", "Settings that match no preset", "OPTIONS", 0)
+CUSTOM = ("CUSTOM", "Custom", "Settings that match no preset", "OPTIONS", 0)
 
 
 def draw_preset_row(
@@ -54,7 +55,12 @@ def draw_preset_row(
     for icon, step in (("TRIA_LEFT", -1), ("TRIA_RIGHT", 1)):
         neighbor = entries[(max(current - 1, 0) + step) % len(entries)] if current else entries[0]
         steps.operator("hairloom.apply_preset", text="", icon=icon).name = neighbor.name
-    buttons.label(text=entries[current - 1].title if current else _CUSTOM[1])
+    shown = entries[current - 1] if current else None
+    buttons.label(
+        text=CUSTOM[1] if shown is None else shown.title,
+        text_ctxt=TRANSLATION_CONTEXT,
+        translate=shown is None or not shown.is_own,
+    )
     file_buttons = buttons.row(align=True)
     file_buttons.operator("hairloom.save_preset", text="Save", icon="ADD").section = section
     file_buttons.operator("hairloom.add_preset", text="", icon="FILE_FOLDER")
@@ -100,7 +106,7 @@ def _preset_property(section: str) -> Any:
             for number, each in enumerate(entries, start=1)
         ]
         if get(_presets) == 0:
-            enum_items.insert(0, _CUSTOM)
+            enum_items.insert(0, CUSTOM)
         return enum_items
 
     def get(_presets: Any) -> int:
@@ -114,7 +120,12 @@ def _preset_property(section: str) -> Any:
 
     title, about = KINDS[section]
     return EnumProperty(
-        name=title, description=f"{about}. Click to choose", items=items, get=get, set=apply
+        name=title,
+        description=f"{about}. Click to choose",
+        items=items,
+        get=get,
+        set=apply,
+        translation_context=TRANSLATION_CONTEXT,
     )
 
 

@@ -15,12 +15,13 @@ from ..blender.preview.diagnostics import instances_note, issues_of, unfelt_note
 from ..blender.preview.phases import Phase
 from ..blender.preview.previews import previews
 from ..blender.properties.properties import TRANSLATION_CONTEXT
-from ..blender.sessions.measures import PARTS, array_bytes
+from ..blender.sessions.measures import array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
 from ..blender.viewport.overlay import notes_of, statistics_of
 from .long_work import draw_esc, running_label
 from .messages import draw_lines, draw_message
+from .texts import translated
 
 _MEGABYTE = 1 << 20
 #: fraction of a line for the name of its value
@@ -57,7 +58,7 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
             row.label(text=running_label())
             draw_esc(row)
             continue
-        row.label(text=text)
+        row.label(text=text, translate=False)
         if name == "State" and session is not None and not session.is_made:
             row.operator("hairloom.cancel_build", text="", icon="X")
 
@@ -65,22 +66,32 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
 def _state(session: Session | None) -> str:
     """What moves the hair at the moment."""
     if session is None:
-        return "not previewed"
+        return translated("not previewed")
     if not session.is_made:
         return _build_text(session.stage)
     preview = previews[session.uid]
     if preview.phase is Phase.BAKED and preview.bake is not None and session.is_recorded:
-        return "baked, out of date" if preview.bake.changed_inputs else "baked"
+        is_stale = preview.bake.changed_inputs
+        return translated("baked, out of date") if is_stale else translated("baked")
     if session.is_pending:
         return _build_text(session.stage)
     if preview.phase is Phase.WAITING or preview.is_deferred:
-        return "waits for collider"
+        return translated("waits for collider")
     device = session.device_name.partition(" ")[0]
-    return f"{'simulated' if session.is_playing else 'at rest'}, {device}"
+    if session.is_playing:
+        return translated("simulated, {device}", device=device)
+    return translated("at rest, {device}", device=device)
 
 
 def _build_text(stage: str) -> str:
-    return f"makes {stage[:1].lower()}{stage[1:] or 'hair'}"
+    """What is being made; stages are those of `prepared_groom`."""
+    texts = {
+        "strands": translated("makes strands"),
+        "ambient occlusion": translated("makes ambient occlusion"),
+        "what the head hides": translated("finds what the head hides"),
+        "light": translated("makes light"),
+    }
+    return texts.get(stage) or translated("makes hair")
 
 
 def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> bool:
@@ -89,7 +100,9 @@ def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> b
     if session is None or not session.cards.is_pending:
         return False
     row = layout.row(align=True)
-    row.label(text=f"Cards: {session.cards.stage or 'waiting'}", icon="SORTTIME")
+    stage = session.cards.stage
+    text = translated("Cards: {stage}", stage=stage) if stage else translated("Cards: waiting")
+    row.label(text=text, icon="SORTTIME", translate=False)
     row.operator("hairloom.cancel_build", text="", icon="X")
     return True
 
@@ -105,23 +118,31 @@ def _statistics(session: Session | None) -> Iterator[Statistic]:
     yield Statistic("Drawn", drawn[0])
     yield Statistic("", drawn[1])
     size = 0 if session is None or rig is None else array_bytes(rig, session.snapshot)
-    memory = f"{size / _MEGABYTE:,.0f} MB, GPU {memory_in_use():,.0f} MB"
+    memory = translated(
+        "{size:,.0f} MB, GPU {on_gpu:,.0f} MB", size=size / _MEGABYTE, on_gpu=memory_in_use()
+    )
     yield Statistic("Memory", memory if size else _NONE)
-    for part in PARTS:
-        milliseconds = None if session is None else session.times.milliseconds(part)
-        yield Statistic(part.capitalize(), _milliseconds(milliseconds))
+    yield Statistic("Simulation", _time(session, "simulation"))
+    yield Statistic("Drawing", _time(session, "drawing"))
 
 
 def _drawn_counts(session: Session) -> tuple[str, str]:
     """The number of drawn strands or cards, and of their vertices or triangles."""
     if session.snapshot.cards is not None:
         cards, triangles, _ = session.cards.counts
-        return f"{cards:,} cards", f"{triangles:,} triangles"
+        return (
+            translated("{count:,} cards", count=cards),
+            translated("{count:,} triangles", count=triangles),
+        )
     drawn = statistics_of(session.uid)
-    return f"{drawn.strands:,} strands", f"{drawn.vertices:,} vertices"
+    return (
+        translated("{count:,} strands", count=drawn.strands),
+        translated("{count:,} vertices", count=drawn.vertices),
+    )
 
 
-def _milliseconds(milliseconds: float | None) -> str:
+def _time(session: Session | None, part: str) -> str:
+    milliseconds = None if session is None else session.times.milliseconds(part)
     if milliseconds is None:
         return _NONE
     return f"{milliseconds:,.0f} ms" if milliseconds >= 100.0 else f"{milliseconds:.1f} ms"
@@ -160,8 +181,9 @@ def draw_problems_row(
     if not problems:
         row.label(text="No problems", icon="CHECKMARK")
         return
-    text = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-    row.operator("hairloom.show_problems", text=text, icon="ERROR")
+    several = translated("{count} problems", count=len(problems))
+    text = translated("1 problem") if len(problems) == 1 else several
+    row.operator("hairloom.show_problems", text=text, icon="ERROR", translate=False)
     fixable = next((problem for problem in problems if problem.operator), None)
     if fixable is not None:
         row.operator(fixable.operator, text=fixable.button, icon="MODIFIER")

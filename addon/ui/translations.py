@@ -1,8 +1,8 @@
 """Translations of the interface, one file per language.
 
 translations/template.json holds texts, {context: {text: ""}}: those of registered classes, and
-literal texts in the code of panels and menus; tools/make_docs.py writes it. Texts with inserted
-numbers or names, and reports, stay English. To add a language, copy the template, for example to
+literal texts in the code of panels and menus, and titles of presets; tools/make_docs.py writes it.
+Reports stay English. To add a language, copy the template, for example to
 translations/de_DE.json, and fill in the texts.
 """
 
@@ -17,8 +17,10 @@ from typing import Any
 
 import bpy
 
+from ..blender.properties.presets import shipped_presets
 from ..blender.properties.properties import BUTTON_CONTEXT, TRANSLATION_CONTEXT
 from .preferences import ROOT_PACKAGE
+from .preset_chooser import CUSTOM, KINDS
 
 FOLDER = Path(__file__).resolve().parents[2] / "translations"
 TEMPLATE = "template"
@@ -30,6 +32,7 @@ _DRAW_FUNCTIONS = {
     "draw_button": (BUTTON_CONTEXT, 2),
     "draw_inactive": ("*", 3),
     "Statistic": (TRANSLATION_CONTEXT, 0),
+    "translated": (TRANSLATION_CONTEXT, 0),
 }
 #: keywords that are texts
 _TEXT_KEYWORDS = ("text", "heading", "disabled_text")
@@ -75,7 +78,7 @@ def updated(content: Texts, template: Texts) -> Texts:
 
 def texts(classes: Iterable[type[Any]]) -> Texts:
     """All texts that the template holds: context -> text -> "", in order."""
-    found = _drawn_texts()
+    found = _drawn_texts() | _preset_texts()
     for each in classes:
         found |= _class_texts(each)
     for name in dir(bpy.ops.hairloom):
@@ -101,6 +104,13 @@ def _drawn_texts() -> set[tuple[str, str]]:
                 for text in (*node.args[first:], *keyword_texts):
                     texts |= {(context, each) for each in _constants(text)}
     return texts
+
+
+def _preset_texts() -> set[tuple[str, str]]:
+    """The titles of presets that come with Hairloom, and the text where none matches."""
+    titles = {entry.title for section in KINDS for entry in shipped_presets(section)}
+    _, custom, about, *_ = CUSTOM
+    return {*((TRANSLATION_CONTEXT, title) for title in (*titles, custom)), ("*", about)}
 
 
 def _constants(text: ast.expr) -> set[str]:

@@ -5,10 +5,14 @@ import re
 
 import bpy
 import pytest
+from panel_layout import Layout
 
 import hairloom
 from hairloom.addon import registration
-from hairloom.addon.ui import translations
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.properties.properties import TRANSLATION_CONTEXT
+from hairloom.addon.ui import preset_chooser, state, texts, translations
 
 #: context -> texts of operators and settings
 DECLARED = {
@@ -18,13 +22,13 @@ DECLARED = {
     "Skin": ("Light", "Dark"),
 }
 
-PLACEHOLDER = re.compile(r"%[a-z]|[{}]")
+PLACEHOLDER = re.compile(r"%[a-z]|{[^}]*}|[{}]")
 
 #: context -> texts that panels draw besides names of operators and settings: a text, either of two,
 #: the reason on an idle button or field, a heading
 DRAWN = {
     "*": ("No problems", "Hairstyles", "as the scene", "Cryptomatte"),
-    "Hairloom": ("Drawn",),
+    "Hairloom": ("Drawn", "at rest, {device}", "{count:,} strands", "Under Water", "Custom"),
     "Hairloom Button": ("Add Hair", "To Material", "Select a Head", "Stop Preview"),
 }
 
@@ -58,10 +62,27 @@ def test_a_changed_text_loses_its_translation_and_the_others_keep_theirs():
 
 def test_texts_of_every_kind_are_found(extension):
     found = translations.texts(registration.CLASSES)
-    for context, texts in (*DECLARED.items(), *DRAWN.items()):
-        assert set(texts) <= set(found[context])
+    for context, expected in (*DECLARED.items(), *DRAWN.items()):
+        assert set(expected) <= set(found[context])
     assert "" not in found["*"]
     assert "Bl Label" not in found["*"], "Blender translates its own"
+
+
+@pytest.mark.parametrize("language", translations.tables())
+def test_state_counts_and_names_of_presets_are_in_the_language(language, new_hair, monkeypatch):
+    table = translations.tables()[language]
+    monkeypatch.setattr(texts, "pgettext_iface", lambda text, context: table[context, text])
+    hair = new_hair()
+    session = previews.start(hair, bpy.context.evaluated_depsgraph_get())
+    layout = Layout([])
+    state.draw_state(layout, session)
+    values = [text for text, _ in layout.texts]
+    at_rest = table[TRANSLATION_CONTEXT, "at rest, {device}"].format(device="CPU")
+    counts = table[TRANSLATION_CONTEXT, "{count:,} strands"].format(count=0)
+    assert at_rest in values and counts in values
+    for section in preset_chooser.KINDS:
+        for entry in presets.shipped_presets(section):
+            assert (TRANSLATION_CONTEXT, entry.title) in table
 
 
 def test_a_language_reaches_blender_and_goes_again(no_extension, monkeypatch, tmp_path):
