@@ -46,7 +46,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
     """Move the strands of the active hair so that their roots lie on the surface"""
 
     bl_idname = "hairloom.snap_roots"
-    bl_label = "Snap Roots to Surface"
+    bl_label = "Snap to Surface"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

@@ -17,6 +17,7 @@ from .selection import (
     needs_hair,
     without_linked_duplicates,
 )
+from .texts import translated
 
 #: Further names are only counted.
 _MAX_LISTED = 2
@@ -78,8 +79,10 @@ def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     curves = hair.data
     lost = lost_by_regrowing(curves)
     lines = layout.column(align=True)
-    lines.label(text=_state(curves, lost), icon="UNLOCKED" if not lost else "LOCKED")
-    lines.label(text=f"Growing again loses: {_listed(lost)}", icon="BLANK1")
+    icon = "UNLOCKED" if not lost else "LOCKED"
+    lines.label(text=_state(curves, lost), icon=icon, translate=False)
+    loses = translated("Growing again loses: {lost}", lost=_listed(lost))
+    lines.label(text=loses, icon="BLANK1", translate=False)
     if not draw_progress(lines, HAIRLOOM_OT_grow_again):
         button = lines.row()
         button.active = bool(lost)
@@ -94,10 +97,12 @@ def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
     if not lost:
-        return "Follows these settings"
+        return translated("Follows these settings")
     if not has_grown(curves):
-        return "Not grown from these"
-    return "Older than these settings" if is_outdated(curves) else "Changed since it grew"
+        return translated("Not grown from these")
+    if is_outdated(curves):
+        return translated("Older than these settings")
+    return translated("Changed since it grew")
 
 
 def _listed(lost: tuple[str, ...]) -> str:

@@ -13,6 +13,7 @@ from ..blender.sessions.session import Session
 from .drawing import draw_button
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
+from .texts import translated
 
 #: Fraction of a table's width for the names.
 _NAME_FRACTION = 0.34
@@ -51,7 +52,7 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button and the last measurement, greyed out once the hair has moved on."""
     session = previews.session_of(hair)
     is_outdated = session is not None and session.figures and not session.are_figures_current
-    text = "Measure Again: Hair Has Moved" if is_outdated else None
+    text = translated("Measure Again: Hair Has Moved") if is_outdated else None
     disabled_text, icon = "Measure: Press Play First", "DRIVER_DISTANCE"
     draw_button(layout, "hairloom.measure", disabled_text, text, in_all_modes=True, icon=icon)
     lines = layout.column(align=True)

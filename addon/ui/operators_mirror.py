@@ -13,6 +13,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .reports import report_outcome
 from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .texts import translated
 
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
@@ -45,8 +46,8 @@ def draw_mirror(layout: bpy.types.UILayout) -> None:
         return
     row = layout.row(align=True)
     for side, text, icon in (
-        ("positive", "Mirror +X to -X", "TRIA_LEFT"),
-        ("negative", "Mirror -X to +X", "TRIA_RIGHT"),
+        ("positive", translated("Mirror +X to -X"), "TRIA_LEFT"),
+        ("negative", translated("Mirror -X to +X"), "TRIA_RIGHT"),
     ):
         button = draw_button(row, "hairloom.mirror_hair", text=text, icon=icon)
         button.side, button.axis = side, "x"
