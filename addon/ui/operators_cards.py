@@ -111,7 +111,7 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button and the counts of the cards, with as many lines before as after."""
     objects = card_objects(hair)
     if not draw_progress(layout, HAIRLOOM_OT_make_cards):
-        text = translated("Make Cards Again") if objects else None
+        text = translated("Make Cards Again") if objects else "Make Cards"
         draw_button(layout, "hairloom.make_cards", text=text, icon="MESH_GRID")
     finest = objects[0] if objects else None
     card_object = finest and finest.hairloom.card_object

@@ -251,7 +251,7 @@ def test_the_panel_shows_the_counts_of_existing_cards(hair):
 
         row = column
 
-        def label(self, text="", icon="NONE"):
+        def label(self, text="", icon="NONE", translate=True):
             labels.append(text)
 
         def operator(self, _name, text="", icon="NONE"):
