@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...errors import HairloomError
+from ...exchange.usd.usd_crate import CRATE, check_crate
 from ...strands import Surface
 from ..base.parts import new_blocks_removed, new_blocks_removed_on_error
 from .surfaces import read_surface, uv_map_note
@@ -112,6 +113,7 @@ def _imported(path: Path) -> list[bpy.types.Object]:
         )
     if not os.path.isfile(path):
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
+    _check_before_reading(path)
     before = {obj.session_uid for obj in bpy.data.objects}
     with new_blocks_removed_on_error() as added:
         try:
@@ -125,6 +127,21 @@ def _imported(path: Path) -> list[bpy.types.Object]:
         if not meshes:
             raise _unreadable(path, "it holds no mesh")
     return sorted(meshes, key=lambda obj: obj.name)
+
+
+def _check_before_reading(path: Path) -> None:
+    """Refuse damaged binary USD files: Blender's importer may fill the memory with them.
+
+    Raises:
+        HairloomError: the file cannot be opened, or is damaged.
+    """
+    try:
+        with path.open("rb") as file:
+            beginning = file.read(len(CRATE))
+    except OSError as error:
+        raise _unreadable(path, error.strerror or str(error)) from error
+    if beginning == CRATE:
+        check_crate(path)
 
 
 def merged_surfaces(parts: list[Surface]) -> Surface:
