@@ -151,7 +151,7 @@ def _ours(rig: Rig, camera: Any, absorption: tuple[float, float, float], world: 
     snapshot = replace(
         studio._rest_snapshot,
         points=rig.strands.points,
-        meshes=studio._meshes(rig.rest_pose),
+        meshes=studio.meshes(rig.rest_pose),
         lights=light.suns,
         ambient=light.ambient,
         harmonics=light.harmonics,

@@ -29,6 +29,7 @@ from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
 from .shafts_pass import draw_separate_shafts, finish_with_shafts
 from .snapshot import MeshSnapshot, Snapshot
+from .strand_pass import Statistics
 from .textures import texture_to_array
 
 type Rgba = tuple[float, float, float, float]
@@ -156,6 +157,11 @@ class ScenePass:
         self._forget_but(scene)
         lit = {groom.key: scene.lit_snapshot(groom) for groom in scene.grooms}
         return {key: self._groom(key).maps(groom) for key, groom in lit.items()}
+
+    @property
+    def statistics(self) -> tuple[Statistics, ...]:
+        """The counts of each groom that was drawn last."""
+        return tuple(each.strands.statistics for each in self._grooms.values())
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -147,6 +147,7 @@ def test_a_node_that_is_muted_or_not_linked_does_not_count(hair: Any) -> None:
 def settings_by(*arguments: str) -> Any:
     parser = command_line.parser()
     options = parser.parse_args(["render", "--output", "x.png", *arguments])
+    job_options.name_grooms(options)
     return job_options.settings_from_options(options)[ShadingSettings]
 
 

@@ -135,7 +135,7 @@ def test_a_misspelt_option_gets_the_usage_of_its_verb_and_a_suggestion(
     message = capsys.readouterr().err
     assert message.startswith("usage: hairloom render ")
     assert message.endswith("--prest looks/blond. Did you mean --preset?\n")
-    assert run(["render", "--object", "Hair", "--output", "still.png"]) == 2
+    assert run(["simulate", "--object", "Hair", "--output", "still.png"]) == 2
     assert capsys.readouterr().err.endswith("--object Hair\n"), "nothing else is meant"
 
 

@@ -7,6 +7,7 @@ are made for this purpose only. Objects are read in the main thread; a thread ma
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -22,6 +23,7 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
+from ...rig_flow import Rig
 from ...shading.settings import StrandSettings
 from ...strands import Surface
 from ..base.objects import objects_in
@@ -74,6 +76,11 @@ class Occluders:
                 notes.append(_occludes_nothing_note(error))
         return tuple(found), tuple(notes)
 
+    def with_rigs(self, rigs: Sequence[tuple[SettingsMap, Rig]]) -> Occluders:
+        """These, and grooms that are not in the scene, with their settings."""
+        more = tuple(_KnownRig(settings, rig) for settings, rig in rigs)
+        return replace(self, _occluders=(*self._occluders, *more))
+
     def gives_same_occlusion(self, other: Occluders) -> bool:
         """Whether both give the same occlusion."""
         if (self.uids, self.notes) != (other.uids, other.notes):
@@ -94,6 +101,20 @@ class _ReadMesh:
     def occlusion_inputs(self) -> tuple[object, ...]:
         surface = self.surface
         return surface.positions, surface.triangles, surface.corner_uv, self.alpha
+
+
+@dataclass(frozen=True, eq=False)
+class _KnownRig:
+    settings: SettingsMap
+    rig: Rig
+
+    def occluder(self) -> CardOccluder:
+        return card_flow.occluder_of(self.rig, self.settings[StrandSettings])
+
+    @property
+    def occlusion_inputs(self) -> tuple[object, ...]:
+        strands = self.rig.strands
+        return strands.points, strands.offsets, strands.radius, self.settings
 
 
 @dataclass(frozen=True, eq=False)

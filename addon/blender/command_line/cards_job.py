@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -15,10 +17,18 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import FORMATS, format_of
+from ...params import SettingsMap
 from ...rig_flow import Rig
 from ..bakes.guide_motion import GuideMotion
+from ..base.file_names import file_paths
 from ..cards.build import CardInputs, order_line
-from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards
+from ..cards.files import (
+    CardOutput,
+    WrittenCards,
+    check_no_input,
+    check_output,
+    write_cards,
+)
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
 from ..scene.bone_weights import head_bone_of
@@ -31,7 +41,16 @@ from .job_options import (
     frames_of_option,
     section_from_options,
 )
-from .job_steps import Job, card_edits, finish, read_baked_motion, read_rig, report_notes
+from .job_steps import (
+    GroomFacts,
+    Job,
+    card_edits,
+    finish,
+    folder_for_several_error,
+    read_baked_motion,
+    read_rig,
+    report_notes,
+)
 from .output_checks import check_not_an_input
 from .verb import Verb
 
@@ -39,16 +58,52 @@ from .verb import Verb
 def cards(job: Job) -> None:
     """Turn hair into cards, sorted from inside to outside: GLB, FBX, USD or OBJ, and textures."""
     options = job.options
-    pictures = _pictures_of_hair(job) | named_pictures(options.texture)
+    own_textures = [Path(argument.partition("=")[2]) for argument in options.texture]
+    named = named_pictures(options.texture)
     path, _ = format_of(job.output, options.format)
-    check_not_an_input(path, options)
-    settings = section_from_options(options, job.settings[CardExportSettings])
-    check_no_input(path, [Path(argument.partition("=")[2]) for argument in options.texture])
-    rig, motion = _read_rig_and_motion(job, settings)
-    look = read_head_look(job.sources, rig.head)
-    output = CardOutput(options.format, settings=settings, head_look=look)
-    build_and_write_cards(job, path, rig, pictures, output, motion)
-    finish(job, path)
+    paths = file_paths(path, job.names)
+    for each in paths:
+        check_not_an_input(each, options)
+        check_no_input(each, own_textures)
+    grooms = []
+    facts = GroomFacts(job)
+    for part, file in zip(job.parts, paths, strict=True):
+        settings = section_from_options(options, part.settings[CardExportSettings])
+        _check_idle_options(part, settings)
+        rig, motion = _read_rig_and_motion(part, settings)
+        facts.added(rig)
+        look = read_head_look(part.sources, rig.head)
+        output = CardOutput(options.format, settings=settings, head_look=look)
+        check_output(file, output, motion)  # before any is written
+        grooms.append((part, file, rig, output, motion))
+    written: list[WrittenCards] = []
+    for part, file, rig, output, motion in grooms:
+        pictures = _pictures_of_hair(part) | named
+        files_beside = [
+            (other.settings, its_rig)
+            for other, _, its_rig, *_ in grooms
+            if other is not part and other.hair is None
+        ]
+        made = build_and_write_cards(part, file, rig, pictures, output, motion, files_beside)
+        written.append(made)
+        if job.others:
+            print(f"Wrote {file}")
+    if job.others:
+        job.report.facts.update(_sums(written))
+    else:
+        finish(job, path)
+
+
+def _sums(written: list[WrittenCards]) -> dict[str, Any]:
+    """The report's facts on the cards of several grooms: sums, and the largest fraction."""
+    levels = zip_longest(*([len(m.triangles) for m in w.levels] for w in written), fillvalue=0)
+    return {
+        "cards": sum(each.mesh.card_count for each in written),
+        "card_shell_layers": sum(each.build.shell_layers for each in written),
+        "card_triangles": sum(len(each.mesh.triangles) for each in written),
+        "card_levels": [sum(each) for each in levels],
+        "card_order_wrong": round(max(each.build.wrong_fraction for each in written), 4),
+    }
 
 
 def _pictures_of_hair(job: Job) -> dict[str, Floats]:
@@ -68,8 +123,13 @@ def build_and_write_cards(
     pictures: Mapping[str, Floats],
     output: CardOutput | None = None,
     motion: GuideMotion | None = None,
+    beside: Sequence[tuple[SettingsMap, Rig]] = (),
 ) -> WrittenCards:
-    """Build and write the cards, and report them."""
+    """Build and write the cards, and report them.
+
+    Args:
+        beside: settings and rigs of grooms of files, which occlude these cards, too.
+    """
     levels = getattr(job.options, "levels", None)
     settings, report = job.settings, job.report
     if levels is not None:
@@ -79,6 +139,8 @@ def build_and_write_cards(
         depsgraph = bpy.context.evaluated_depsgraph_get()
         output = replace(output, head_bone=head_bone_of(hair, depsgraph, rig.strands))
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
+    if settings[CardOcclusionSettings].others:
+        occluders = occluders.with_rigs(beside)
     inputs = CardInputs(rig, settings, pictures, occluders, card_edits(job))
     on_step = report.steps("building hair cards")
     written = write_cards(path, inputs, output, report.stage, motion, on_step)
@@ -112,7 +174,8 @@ def _read_rig_and_motion(job: Job, settings: CardExportSettings) -> tuple[Rig, G
     """The hair, and its motion if requested: the bake in a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
-    _check_idle_options(job, settings)
+    if job.others and options.bake:
+        raise folder_for_several_error(job)
     if settings.motion != "none":
         motion = read_baked_motion(job, frames)
         return motion.rig, motion
@@ -170,6 +233,8 @@ CARDS = Verb(
     "cards",
     cards,
     _add_options,
-    output="hair cards to write (.glb, .fbx, .usd, .usda, .usdc or .obj)",
+    output="hair cards to write (.glb, .fbx, .usd, .usda, .usdc or .obj); several grooms get a file"
+    " each, NAME_GROOM.glb",
+    takes_several=True,
     operators=("export_cards",),
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -30,7 +31,7 @@ from .grow_job import GROW
 from .idle_options import check_idle_options, has_scene
 from .import_job import IMPORT
 from .inputs import Sources
-from .job_options import check_numbers, settings_from_options
+from .job_options import check_numbers, name_grooms, settings_from_options
 from .job_steps import Job, report_notes
 from .object_settings import find_hair, is_groom, named_objects, usable_objects
 from .output_checks import check_outputs, check_report
@@ -171,10 +172,14 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     elif not bpy.data.filepath and (verb.saves_scene or verb is RUN):
         named = getattr(options, "object", None) or ()
         remove_startup_cube([*named, getattr(options, "head", None)])
+    name_grooms(options)
     check_idle_options(verb, options)
     if verb.takes_hair and not (options.groom or options.style):
         if getattr(options, "bake", None):
             options.groom = _groom_of_bake(options, report)
+        elif verb.takes_several:
+            options.grooms = _grooms_of_scene(options, report)
+            options.groom = options.grooms[0] if options.grooms else None
         elif not hasattr(options, "object"):
             options.groom = _only_groom(options, report)
     if verb.takes_hair and options.style:
@@ -183,19 +188,29 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     output = getattr(options, "output", None)
     if verb.saves_scene:
         check_scene_output(output, overwrites=options.save)
+    groom = getattr(options, "groom", None)
+    first, *others = (getattr(options, "grooms", None) or [groom]) if groom else [groom]
+    job = _job_on(first, verb, options, report)
+    return replace(job, others=tuple(_job_on(each, verb, options, report) for each in others))
+
+
+def _job_on(groom: str | None, verb: Verb, options: argparse.Namespace, report: Report) -> Job:
+    """The job on one groom."""
+    output = getattr(options, "output", None)
+    has_settings = verb.takes_settings
     return Job(
         verb=verb.name,
-        sources=_sources(verb, options) if verb.takes_hair else Sources(),
-        stored_settings=settings_from_options(options) if verb.takes_settings else SettingsMap(),
+        sources=_sources(groom, verb, options) if verb.takes_hair else Sources(),
+        stored_settings=settings_from_options(options, groom) if has_settings else SettingsMap(),
         output=Path() if output is None else output,
         options=options,
         report=report,
     )
 
 
-def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
+def _sources(groom: str | None, verb: Verb, options: argparse.Namespace) -> Sources:
     return Sources(
-        groom=options.groom,
+        groom=groom,
         head=options.head,
         collider=options.collider,
         groom_scale=options.groom_scale,
@@ -205,7 +220,7 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         need_uv=options.strict,
         density_group=options.density_group,
         length_group=options.length_group,
-        children_density=options.children_density or _children_density(options.groom),
+        children_density=options.children_density or _children_density(groom),
         skin=options.skin,
         with_face=bool(options.style),
     )
@@ -243,17 +258,28 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     Raises:
         HairloomError: there are several, there is none, or it is hidden or empty.
     """
-    if not has_scene(options) or options.head:
-        return None
-    found, notes = usable_objects(is_groom, "--groom")
-    report_notes(list(notes), report)
-    grooms = [obj.name for obj in found]
+    grooms = _grooms_of_scene(options, report)
     if len(grooms) > 1:
+        together = "bake them together with the verb bake"
         raise HairloomError(
             f"this scene has hair in several objects: {', '.join(sorted(grooms))}",
             place="--scene",
-            remedy="Name one of them with --groom",
+            remedy=f"Name one of them with --groom, or {together}",
         )
+    return grooms[0] if grooms else None
+
+
+def _grooms_of_scene(options: argparse.Namespace, report: Report) -> list[str]:
+    """The hair of the scene, if no option names another source of hair; else none.
+
+    Raises:
+        HairloomError: there is none, or all of it is hidden or empty.
+    """
+    if not has_scene(options) or options.head:
+        return []
+    found, notes = usable_objects(is_groom, "--groom")
+    report_notes(list(notes), report)
+    grooms = [obj.name for obj in found]
     if not grooms:
         raise HairloomError(
             "there is no hair in this scene",
@@ -261,7 +287,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
             remedy="Name a file with --groom, a hairstyle with --style, or with --head a mesh on"
             " which hair is grown",
         )
-    return grooms[0]
+    return grooms
 
 
 def _groom_of_bake(options: argparse.Namespace, report: Report) -> str | None:

@@ -33,7 +33,7 @@ def demo(job: Job) -> None:
         studio = open_studio(job, rig)
         still = write_still(job, folder / "still.png", studio, PosedHair.of_rest(rig))
         _write_close_up(job, folder / "close_up.png", studio, rig)
-        write_sheet(job, folder / "motion.png", studio, motion)
+        write_sheet(job, folder / "motion.png", studio, [motion])
     report_notes(list(studio.notes), report)
     written = build_and_write_cards(job, folder / "cards.glb", rig, pictures)
     _write_card_still(job, folder / "cards.png", studio, rig, written, still)

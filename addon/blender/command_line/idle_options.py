@@ -40,7 +40,8 @@ def exports_scene_hair(options: argparse.Namespace) -> bool:
 
 def _is_in_file(options: argparse.Namespace) -> bool:
     """Whether --groom names a file instead of an object of the scene."""
-    return bool(options.groom) and bpy.data.objects.get(options.groom) is None
+    names = getattr(options, "grooms", None) or filter(None, [options.groom])
+    return any(bpy.data.objects.get(name) is None for name in names)
 
 
 def _is_grown(options: argparse.Namespace) -> bool:

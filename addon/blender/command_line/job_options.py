@@ -20,19 +20,37 @@ from ..properties.presets import named_preset, shipped_presets
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from ..setup.hairstyles import shipped_hairstyles as hairstyles
-from .object_settings import find_hair, settings_of_object
+from .object_settings import find_hair, is_groom, named_objects, settings_of_object
 from .overrides import overrides
 
 
-def add_hair_options(parser: argparse.ArgumentParser) -> None:
-    """Add options for the hair that a verb works on, see inputs.Sources."""
+def add_hair_options(parser: argparse.ArgumentParser, *, takes_several: bool = False) -> None:
+    """Add options for the hair that a verb works on, see inputs.Sources.
+
+    Args:
+        takes_several: whether --groom can be repeated; `name_grooms` then makes one list of all.
+    """
     sources = parser.add_argument_group("what to work on (files, or objects of the scene)")
     files = ", ".join(SUFFIXES)
-    sources.add_argument(
-        "--groom",
-        help=f"hair curves of the scene, or a groom file ({files}; "
-        "default: hair grown on the head)",
+    groom_help = (
+        f"hair curves of the scene, or a groom file ({files}; default: hair grown on the head)"
     )
+    if takes_several:
+        sources.add_argument(
+            "--groom", action="append", default=[], dest="grooms", metavar="GROOM", help=groom_help
+        )
+        parser.add_argument_group("several grooms").add_argument(
+            "--object",
+            action="append",
+            default=[],
+            dest="hair_objects",
+            metavar="NAME",
+            help="hair curves of the scene; can be repeated, as --groom can, to have several "
+            "together (default: all hair of the scene)",
+        )
+        parser.set_defaults(groom=None)
+    else:
+        sources.add_argument("--groom", help=groom_help)
     sources.add_argument(
         "--style",
         choices=[entry.name for entry in hairstyles()],
@@ -87,6 +105,20 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     sources.add_argument(
         "--strict", action="store_true", help="fail if any strand has to be dropped"
     )
+
+
+def name_grooms(options: argparse.Namespace) -> None:
+    """Let `options.grooms` be all hair that a verb for several names, each once, and
+    `options.groom` the first of it, or None; call it when the scene is open.
+
+    Raises:
+        HairloomError: --object names no hair curves of the scene.
+    """
+    if hasattr(options, "grooms"):
+        objects = named_objects(options.hair_objects, is_groom, "hair curves")
+        names = [*options.grooms, *(obj.name for obj in objects)]
+        options.grooms = list(dict.fromkeys(names))
+        options.groom = options.grooms[0] if options.grooms else None
 
 
 def add_head_scale_option(parser: Any, help_text: str) -> None:
@@ -367,14 +399,18 @@ def _stage_preset(stage: str) -> Preset[Any]:
     return preset
 
 
-def settings_from_options(options: argparse.Namespace) -> SettingsMap:
-    """All settings; later sources override earlier ones: defaults, the hair object of --groom,
-    --preset, the material, --set."""
+def settings_from_options(options: argparse.Namespace, groom: str | None = None) -> SettingsMap:
+    """All settings; later sources override earlier ones: defaults, the hair object --groom,
+    --preset, the material, --set.
+
+    Args:
+        groom: the one of several grooms; None: the only one.
+    """
     chosen: dict[str, Settings] = {section: made() for section, made in ALL_SETTINGS.items()}
-    name = getattr(options, "groom", None)
-    groom = find_hair(name)
-    if groom is not None:
-        chosen |= settings_of_object(groom)
+    name = groom or getattr(options, "groom", None)
+    hair = find_hair(name)
+    if hair is not None:
+        chosen |= settings_of_object(hair)
     for preset in _presets(options):
         chosen |= {settings.section: settings for settings in preset.all}
     if hasattr(options, "groom") and getattr(options, "look_from_material", False):

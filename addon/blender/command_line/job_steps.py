@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import bpy
 import numpy as np
@@ -32,6 +33,7 @@ from ..base.report import Report
 from ..cards.edits import read_edits
 from ..colliders.rigs import rig_from
 from ..colliders.ties import TrackedHolders
+from ..pictures.group_studio import GroupStudio, PosedCompanion
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
@@ -40,6 +42,7 @@ from ..scene.painted_colors import painted_colors
 from ..scene.source import Source
 from ..sessions.prepared_groom import prepare_groom
 from .inputs import (
+    BUILT_IN,
     Inputs,
     Sources,
     check_groom,
@@ -50,6 +53,11 @@ from .inputs import (
 )
 from .object_settings import find_hair
 
+#: facts of the report that are summed over several grooms, and those of which the largest counts
+_SUMS = ("strands", "guides", "held_strands", "children", "points")
+_EXTREMES = ("cv_count", "points_of_a_strand_max")
+#: facts that are only reported for each groom
+_OF_EACH = ("widths", "children_line")
 #: settings that a bake is made with, and keeps
 _BAKED = (GrowSettings, GuideSettings, ChildrenSettings, WidthSettings, DynamicsSettings)
 
@@ -59,6 +67,7 @@ class Job:
     """One call of a verb: its inputs, settings, output and report.
 
     stored_settings: as the artist chose them; `settings`: as they act where hair is wet or dusty.
+    others: where several grooms are named, a job for each but the first.
     """
 
     verb: str
@@ -67,6 +76,22 @@ class Job:
     output: Path
     options: argparse.Namespace
     report: Report
+    others: tuple[Job, ...] = ()
+
+    @property
+    def parts(self) -> tuple[Job, ...]:
+        """A job for each groom, this one first."""
+        return (self, *self.others)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the grooms: of objects, or of files without their suffixes."""
+        return tuple(
+            each.sources.groom
+            if each.hair is not None and each.sources.groom
+            else Path(each.sources.groom or BUILT_IN).stem
+            for each in self.parts
+        )
 
     @cached_property
     def settings(self) -> SettingsMap:
@@ -282,6 +307,100 @@ def posed_hair(job: Job) -> PosedHair:
     return PosedHair.of_motion(motion, with_uvs(motion.rig, job.sources), motion.frames[0])
 
 
+def posed_grooms(job: Job) -> tuple[PosedHair, ...]:
+    """`posed_hair` of each groom, all in the same frame: --frame, else the first that all bakes
+    hold.
+
+    Raises:
+        HairloomError: one folder of --bake for several grooms, or bakes without a common frame.
+    """
+    if not job.others:
+        return (posed_hair(job),)
+    facts = GroomFacts(job)
+    if job.options.bake is None:
+        return tuple(PosedHair.of_rest(facts.added(read_rig(part)[0])) for part in job.parts)
+    motions, found = motions_of_grooms(job), []
+    frame = common_frames(job, motions)[0]
+    for part, motion in zip(job.parts, motions, strict=True):
+        rig = with_uvs(motion.rig, part.sources)
+        found.append(PosedHair.of_motion(motion, rig, frame))
+    return tuple(found)
+
+
+def motions_of_grooms(job: Job) -> tuple[BakedGuides, ...]:
+    """The baked motion of each groom, in --frame or in all frames.
+
+    Raises:
+        HairloomError: as `read_baked_motion`, or one folder for several grooms.
+    """
+    if job.others and job.options.bake:
+        raise folder_for_several_error(job)
+    facts, frame = GroomFacts(job), getattr(job.options, "frame", None)
+    frames, motions = None if frame is None else range(frame, frame + 1), []
+    for part in job.parts:
+        motions.append(read_baked_motion(part, frames))
+        facts.added(motions[-1].rig)
+    return tuple(motions)
+
+
+def folder_for_several_error(job: Job) -> HairloomError:
+    return HairloomError(
+        f"a folder holds the bake of one groom, and these are several: {', '.join(job.names)}",
+        place=f"--bake {job.options.bake}",
+        remedy="Give --bake without a folder to use the bake of each, or name one with --groom",
+    )
+
+
+def common_frames(job: Job, motions: Sequence[BakedGuides]) -> range:
+    """The frames that all motions hold.
+
+    Raises:
+        HairloomError: there are none.
+    """
+    first = max(each.frames[0] for each in motions)
+    frames = range(first, min(each.frames[-1] for each in motions) + 1)
+    if not frames:
+        held = (f"{each.frames[0]} to {each.frames[-1]}" for each in motions)
+        pairs = ", ".join(f"{name}: {each}" for name, each in zip(job.names, held, strict=True))
+        raise HairloomError(
+            f"their bakes have no frame in common ({pairs})",
+            place="--bake",
+            remedy="Bake them together, or name one of them with --groom",
+        )
+    return frames
+
+
+class GroomFacts:
+    """What the report says of several grooms: each by itself under "grooms", and their sums. For
+    one groom, the report stays as it is."""
+
+    def __init__(self, job: Job) -> None:
+        self._job, self._grooms = job, list[dict[str, Any]]()
+
+    def added[Result](self, result: Result) -> Result:
+        """Take the facts that the report now has of one groom; returns the argument."""
+        facts = self._job.report.facts
+        if not self._job.others:
+            return result
+        known = (*_SUMS, *_EXTREMES, *_OF_EACH, "groom", "dropped", "bounds_m")
+        self._grooms.append({name: facts[name] for name in known if name in facts})
+        lows, highs = zip(*(each["bounds_m"] for each in self._grooms), strict=True)
+        dropped: Counter[str] = Counter()
+        for each in self._grooms:
+            dropped.update(each.get("dropped", {}))
+        facts |= {n: sum(each[n] for each in self._grooms) for n in _SUMS if n in facts}
+        facts |= {n: max(each[n] for each in self._grooms) for n in _EXTREMES if n in facts}
+        facts |= {
+            "groom": ", ".join(each["groom"] for each in self._grooms),
+            "dropped": dict(dropped),
+            "bounds_m": [np.min(lows, axis=0).tolist(), np.max(highs, axis=0).tolist()],
+            "grooms": list(self._grooms),
+        }
+        for name in _OF_EACH:
+            facts.pop(name, None)
+        return result
+
+
 def with_uvs(rig: Rig, sources: Sources) -> Rig:
     """A bake's rig with the UVs of the head, which bakes do not hold and which the shadow on the
     head needs. Unchanged if no head is named, or if its triangles have changed."""
@@ -303,13 +422,31 @@ def card_edits(job: Job) -> CardEdits | None:
 
 def open_studio(job: Job, rig: Rig) -> Studio:
     """The studio that draws this job's hair."""
+    studio = _studio(job, rig)
+    report_notes(list(studio.warnings), job.report)
+    return studio
+
+
+def open_studio_of(job: Job, hair: Sequence[PosedHair]) -> Studio:
+    """The studio that draws all grooms of this job, see `posed_grooms`, together."""
+    if not job.others:
+        return open_studio(job, hair[0].rig)
+    companions = [
+        PosedCompanion(_studio(part, each.rig), each.pose, each.points, each.guides)
+        for part, each in zip(job.others, hair[1:], strict=True)
+    ]
+    studio = _studio(job, hair[0].rig, partial(GroupStudio, companions))
+    report_notes(list(studio.warnings), job.report)
+    return studio
+
+
+def _studio(job: Job, rig: Rig, kind: Callable[..., Studio] = Studio) -> Studio:
+    """The studio of one groom."""
     with job.report.stage("ambient occlusion"):
         groom = prepare_groom(rig, job.settings[AmbientSettings])
     edits = card_edits(job)
     look = read_head_look(job.sources, rig.head)
-    studio = Studio(groom, GroomSettings(job.settings), look=look, edits=edits)
-    report_notes(list(studio.warnings), job.report)
-    return studio
+    return kind(groom, GroomSettings(job.settings), look=look, edits=edits)
 
 
 def finish(job: Job, output: Path) -> None:

@@ -4,6 +4,8 @@ maps, the shadow on skin, and frames of the motion."""
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +15,17 @@ from ...errors import HairloomError
 from ...shading.volume.settings import VolumeSettings
 from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
+from ..pictures.group_studio import GroupStudio
 from ..pictures.studio import Studio
 from .job_options import add_bake_frame_options, add_picture_options
 from .job_steps import (
     Job,
     PosedHair,
+    common_frames,
     finish,
-    open_studio,
-    posed_hair,
-    read_baked_motion,
+    motions_of_grooms,
+    open_studio_of,
+    posed_grooms,
     report_notes,
 )
 from .verb import Verb
@@ -35,10 +39,11 @@ def render(job: Job) -> None:
     """Draw a still at rest or in a frame of a bake, and a contact sheet of the motion."""
     options = job.options
     _check(job)
-    hair = posed_hair(job)
-    studio = open_studio(job, hair.rig)
+    grooms = posed_grooms(job)
+    hair, studio = grooms[0], open_studio_of(job, grooms)
     if options.sheet:
-        write_sheet(job, Path(options.sheet), studio, read_baked_motion(job))
+        write_sheet(job, Path(options.sheet), studio, motions_of_grooms(_in_all_frames(job)))
+        place_companions(studio, grooms[1:])
     write_still(job, job.output, studio, hair)
     if options.slices:
         _write_slices(job, Path(options.slices), studio, hair)
@@ -75,13 +80,15 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats
     return picture
 
 
-def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> None:
-    """Write frames spread evenly over the motion, as one picture."""
-    count = min(SHEET_COLUMNS * SHEET_ROWS, len(motion.frames))
+def write_sheet(job: Job, path: Path, studio: Studio, motions: Sequence[BakedGuides]) -> None:
+    """Write frames spread evenly over the motion of all grooms, as one picture."""
+    frames = common_frames(job, motions)
+    count = min(SHEET_COLUMNS * SHEET_ROWS, len(frames))
     progress, pictures = job.report.progress("drawing the contact sheet", count), []
-    for place in np.linspace(0, len(motion.frames) - 1, count).round().astype(int):
+    for place in np.linspace(0, len(frames) - 1, count).round().astype(int):
         with job.report.stage("interpolate strands"):
-            hair = PosedHair.of_motion(motion, motion.rig, motion.frames[place])
+            hair, *others = (PosedHair.of_motion(m, m.rig, frames[place]) for m in motions)
+            place_companions(studio, others)
         with job.report.stage("draw frame"):
             picture = studio.picture(
                 *(hair.pose, hair.points, *SHEET_SIZE), 2, guides=hair.guides, is_soft=False
@@ -92,8 +99,31 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
     job.report.add_output(path)
 
 
+def place_companions(studio: Studio, hair: Sequence[PosedHair]) -> None:
+    """Put the other grooms of a studio where they are in another frame."""
+    if isinstance(studio, GroupStudio):
+        studio.companions = tuple(
+            replace(each, pose=posed.pose, points=posed.points, guides=posed.guides)
+            for each, posed in zip(studio.companions, hair, strict=True)
+        )
+
+
+def _in_all_frames(job: Job) -> Job:
+    """The job without --frame, for the frames of a contact sheet."""
+    options = argparse.Namespace(**{**vars(job.options), "frame": None})
+    others = tuple(replace(each, options=options) for each in job.others)
+    return replace(job, options=options, others=others)
+
+
 def _check(job: Job) -> None:
     """Refuse pictures that cannot be drawn, before inputs are read."""
+    for name in ("slices", "skin_shadow") if job.others else ():
+        if getattr(job.options, name):
+            raise HairloomError(
+                f"it shows the shadow of one groom, and several are drawn: {', '.join(job.names)}",
+                place="--" + name.replace("_", "-"),
+                remedy="Name one of them with --groom",
+            )
     if job.options.sheet and job.options.bake is None:
         raise HairloomError(
             "a contact sheet needs motion", place="--sheet", remedy="Give a bake with --bake"
@@ -160,5 +190,6 @@ RENDER = Verb(
     _add_options,
     output="picture to write (.png)",
     suffix=".png",
+    takes_several=True,
     operators=("show_slices", "show_skin_shadow"),
 )

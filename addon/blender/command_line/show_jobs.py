@@ -7,7 +7,7 @@ import argparse
 from ..pictures.sheet import Sheet
 from ..pictures.turntable import LIGHTS, Turntable, TurntableSettings
 from .job_options import add_bake_frame_options, add_picture_options
-from .job_steps import Job, finish, open_studio, posed_hair, report_notes
+from .job_steps import Job, finish, open_studio_of, posed_grooms, report_notes
 from .verb import Verb
 
 
@@ -24,8 +24,8 @@ def turntable(job: Job) -> None:
         video=not options.no_video,
         frame_rate=options.frame_rate,
     )
-    hair = posed_hair(job)
-    studio = open_studio(job, hair.rig)
+    grooms = posed_grooms(job)
+    hair, studio = grooms[0], open_studio_of(job, grooms)
     turn = Turntable(studio, hair.pose, hair.points, chosen, job.output, guides=hair.guides)
     progress = report.progress("drawing the turntable", chosen.frames)
     with report.stage("draw turntable"):
@@ -40,8 +40,8 @@ def turntable(job: Job) -> None:
 def sheet(job: Job) -> None:
     """Draw a contact sheet: the groom from all sides, or in all looks."""
     options, report = job.options, job.report
-    hair = posed_hair(job)
-    studio = open_studio(job, hair.rig)
+    grooms = posed_grooms(job)
+    hair, studio = grooms[0], open_studio_of(job, grooms)
     size, samples = (options.width, options.height), options.samples
     contact_sheet = Sheet(
         studio,
@@ -103,6 +103,7 @@ TURNTABLE = Verb(
     _add_turntable_options,
     output="folder for the pictures and the video",
     writes_folder=True,
+    takes_several=True,
     operators=("turntable",),
 )
 SHEET = Verb(
@@ -111,5 +112,6 @@ SHEET = Verb(
     _add_sheet_options,
     output="picture to write (.png); --width and --height apply to each picture in it",
     suffix=".png",
+    takes_several=True,
     operators=("contact_sheet",),
 )

@@ -36,6 +36,7 @@ class Verb:
     default_output: where it writes without --output.
     needs_output: whether --output must be given.
     takes_hair: whether it works on hair of --groom, --head and --collider.
+    takes_several: whether --groom can be repeated, and all hair of a scene is used by default.
     needs_head: whether it refuses hair without a head.
     takes_settings: whether it has --set and --preset.
     opens_scene: whether it has --scene.
@@ -53,6 +54,7 @@ class Verb:
     default_output: Path | None = None
     needs_output: bool = True
     takes_hair: bool = True
+    takes_several: bool = False
     needs_head: bool = False
     takes_settings: bool = True
     opens_scene: bool = True
@@ -74,7 +76,7 @@ class Verb:
         if output:
             add_output_option(parser, output, self.default_output, needed=is_needed)
         if self.takes_hair:
-            add_hair_options(parser)
+            add_hair_options(parser, takes_several=self.takes_several)
         self.add_options(parser)
         if self.takes_settings:
             add_settings_options(parser)

@@ -85,16 +85,14 @@ class Sheet:
         yield CLOSE_UP, self._draw(self._camera(side.three_quarter, self._close_up_points()))
 
     def _looks(self) -> Iterator[tuple[str, Floats]]:
-        settings = self._studio.settings
         camera = self._camera(self._studio.side.three_quarter, self._framed_points)
         try:
             for entry in shipped_presets("shading"):
                 look = effective_settings(SettingsMap(*named_preset(entry.name).all))
-                parts = look[ShadingSettings], look[ShaftSettings]
-                self._studio.settings = settings.with_settings(*parts)
+                self._studio.show_look(look[ShadingSettings], look[ShaftSettings])
                 yield entry.title, self._draw(camera)
         finally:
-            self._studio.settings = settings
+            self._studio.show_look()
 
     def _draw(self, camera: Camera) -> Floats:
         hair = self._pose, self._points

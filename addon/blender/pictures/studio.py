@@ -12,6 +12,7 @@ import numpy as np
 from ...arrays import Floats
 from ...cards.edits import CardEdits
 from ...motion_flow import style_of_guides
+from ...params import Settings
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
@@ -28,7 +29,7 @@ from ...shading.stage import backdrop, over_backdrop, stage_lights
 from ...shading.stage_settings import StageSettings
 from ...shading.volume.light_frame import Ball
 from ...shading.volume.shadow_lights import shadow_warnings
-from ...strands import Surface
+from ...strands import StrandSet, Surface
 from ..base.gpu_context import ensure_gpu
 from ..cards.build import BuiltCards, CardInputs, cards_key
 from ..cards.show import as_shown
@@ -75,7 +76,7 @@ class Studio:
         self._cameras: dict[float, Camera] = {}
         self._cards: tuple[Hashable, BuiltCards] | None = None
         self._card_pictures, self._look, self._edits = card_pictures or {}, look, edits
-        self.settings = settings
+        self.settings = self._own_settings = settings
 
     @property
     def _rest_snapshot(self) -> Snapshot:
@@ -109,22 +110,36 @@ class Studio:
             on_sample: with soft shadows, called with the number of samples that are done, of
                 `sample_count`.
         """
-        camera, occluders = camera or self._camera(width / height), self._groom.occluders
+        camera = camera or self._camera(width / height)
         snapshot = replace(
-            self._rest_snapshot,
-            points=points,
-            meshes=self._meshes(pose),
+            self.snapshot(pose, points, guides),
+            meshes=self.meshes(pose),
             lights=self.lights(camera) if lights is None else lights,
             ambient=self.stage.ambient,
-            occluder_spheres=None if occluders is None else occluders.at(pose),
-            cards=self._cards_at(pose, guides),
         )
-        picture = self._draw(as_shown(snapshot), camera, width, height, samples, is_soft, on_sample)
+        picture = self._draw(snapshot, camera, width, height, samples, is_soft, on_sample)
         return (
             picture
             if is_transparent
             else over_backdrop(picture, backdrop(self.stage, width, height))
         )
+
+    def snapshot(self, pose: Pose, points: Floats, guides: Floats | None = None) -> Snapshot:
+        """The hair as `picture` draws it, without meshes and lights."""
+        occluders = self._groom.occluders
+        return as_shown(
+            replace(
+                self._rest_snapshot,
+                points=points,
+                occluder_spheres=None if occluders is None else occluders.at(pose),
+                cards=self._cards_at(pose, guides),
+            )
+        )
+
+    def show_look(self, *look: Settings) -> None:
+        """Draw with other settings of these kinds, until the next call; with none, with its own."""
+        own = self._own_settings
+        self.settings = own.with_settings(*look) if look else own
 
     def sample_count(self, samples: int) -> int:
         """The number of samples of a picture with soft shadows."""
@@ -167,6 +182,11 @@ class Studio:
         write_picture(path, picture, self.stage)
 
     @property
+    def head_occlusion(self) -> Floats | None:
+        """(vertex_count,) fraction of ambient light that this hair lets through to the head."""
+        return self._groom.head_occlusion
+
+    @property
     def stage(self) -> StageSettings:
         return self.settings[StageSettings]
 
@@ -188,8 +208,19 @@ class Studio:
     def side(self) -> GoodSide:
         """The directions from which the groom at rest is best seen. Children do not count, since
         they are random and would change the view."""
-        parents = np.arange(self._rig.strands.strand_count - self._rig.child_count)
-        return good_side(self._rig.strands.take(parents), self._rig.head)
+        return good_side(self.parents, self.head)
+
+    @property
+    def parents(self) -> StrandSet:
+        """The strands at rest, without children."""
+        return self._rig.strands.take(
+            np.arange(self._rig.strands.strand_count - self._rig.child_count)
+        )
+
+    @property
+    def head(self) -> Surface | None:
+        """The head at rest."""
+        return self._rig.head
 
     def _cards_at(self, pose: Pose, guides: Floats | None) -> CardSnapshot | None:
         """The cards on these guides; None if strands are shown."""
@@ -224,7 +255,7 @@ class Studio:
         return replace(
             self._rest_snapshot,
             points=points,
-            meshes=self._meshes(pose),
+            meshes=self.meshes(pose),
             lights=self.lights(self._camera(1.0)),
         )
 
@@ -241,7 +272,7 @@ class Studio:
         snapshot = Snapshot(
             points=np.zeros((0, 3), np.float32),
             radius=np.zeros(0, np.float32),
-            meshes=self._meshes(self._rig.rest_pose),
+            meshes=self.meshes(self._rig.rest_pose),
             lights=self.lights(camera),
             ambient=self.stage.ambient,
             shading=self._rest_snapshot.shading,
@@ -311,10 +342,17 @@ class Studio:
         offsets = self._rig.strands.offsets
         return points.reshape(-1, 3)[(offsets[:-1] + offsets[1:]) // 2]
 
-    def _meshes(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
+    def meshes(self, pose: Pose, occlusion: Floats | None = None) -> tuple[MeshSnapshot, ...]:
+        """The parts of the head in this pose; none without a head.
+
+        Args:
+            occlusion: (vertex_count,) instead of that by this hair, see MeshSnapshot.
+        """
         if self._rig.head is None or pose.head_positions is None:
             return ()
         head = self._rig.head
         surface = Surface(pose.head_positions, head.triangles, head.corner_uv)
-        head_mesh = MeshSnapshot.of(surface, occlusion=self._groom.head_occlusion, is_skin=True)
+        if occlusion is None:
+            occlusion = self.head_occlusion
+        head_mesh = MeshSnapshot.of(surface, occlusion=occlusion, is_skin=True)
         return (head_mesh,) if self._look is None else head_parts(head_mesh, self._look)
