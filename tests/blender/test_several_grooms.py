@@ -23,6 +23,7 @@ from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom, prepare_groom
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.hair_file import write_hair_file
+from hairloom.addon.groom import automatic_children
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.refine.settings import DetailSettings
@@ -179,6 +180,39 @@ def test_cards_of_several_grooms_are_a_file_each(
     assert not scene.with_name("wig.glb").exists()
     shown = capfd.readouterr().out
     assert "wig_Fringe.glb" in shown and "wig_Hair.glb" in shown
+
+
+def test_the_folder_of_several_bakes_names_them(
+    run: Callable[..., dict[str, Any]], scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The verb bake writes a folder for each object into its own."""
+    folder = str(scene.with_name("baked"))
+    arguments = ["bake", "--scene", str(scene), "--frames", "1", "2", "--output", folder]
+    assert command_line.run(arguments) == 0
+    capsys.readouterr()
+    run("render", "--bake", folder, *SMALL, output="p.png", code=1)
+    assert "there is no bake here. Choose one of those in it: Fringe, Hair." in (
+        capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(("count", "option"), [(40, "method=multi"), (1000, "method=none")])
+def test_a_remedy_for_children_names_its_option(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    sphere: Any,
+    count: int,
+    option: str,
+) -> None:
+    """The panel's words alone do not help on the command line."""
+    monkeypatch.setattr(automatic_children, "_MAX_STRANDS", 2000)
+    path = tmp_path / "back.hair"
+    write_hair_file(path, hedgehog(count))
+    head = [] if count == 40 else ["--head", "Head"]
+    arguments = ["export", "--groom", str(path), *head, "--output", str(tmp_path / "out.hair")]
+    assert command_line.run(arguments) == 0
+    assert f"(--set children.{option}) to " in capfd.readouterr().out
 
 
 def test_cards_of_files_darken_each_other(

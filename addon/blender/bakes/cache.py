@@ -389,10 +389,12 @@ def _read_facts(path: Path) -> dict[str, Any]:
             raise ValueError(f"it has more than {_MAX_FACTS_BYTES:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        inner = sorted(each.parent.name for each in path.parent.glob(f"*/{path.name}"))
+        of_several = f"Choose one of those in it: {', '.join(inner)}"
         raise HairloomError(
             "there is no bake here",
             place=str(path.parent),
-            remedy="Bake first, or choose the folder of a bake",
+            remedy=of_several if inner else "Bake first, or choose the folder of a bake",
         ) from error
     except UnicodeDecodeError as error:
         raise _damaged(path, "it is not text") from error
