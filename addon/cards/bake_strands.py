@@ -79,7 +79,9 @@ def flat_strands(
     width: Floats = np.maximum(strips.width[tile], _TINY)
     row_count = points.shape[1]
     if plan.root_slope is not None:
-        ahead = ahead - aside * plan.root_slope[tile, None] * root_slants(row_count)
+        ahead = ahead - aside * plan.root_slope[tile, None] * root_slants(
+            np.linspace(0.0, 1.0, row_count, dtype=np.float32)
+        )
     spacing = np.linalg.norm(np.gradient(frames.center, axis=1), axis=-1)[tile] * (row_count - 1)
     spacing = np.maximum(spacing, _TINY)
     radii = radius[plan.strands] * plan.thickness[tile, None] / width

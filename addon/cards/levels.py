@@ -218,10 +218,13 @@ def _silhouette_error(cut: _Cut, finest: Strips) -> float:
     center, side, tangent = (np.zeros_like(finest.frames.center) for _ in range(3))
     half = np.zeros_like(finest.width)
     for cards, strips in _strips_by_segment_count(cut):
-        center[cards] = interpolated_rows(strips.frames.center, along)
-        side[cards] = interpolated_rows(strips.frames.side, along)
-        tangent[cards] = interpolated_rows(strips.frames.tangent, along)
-        half[cards] = interpolated_rows(strips.width[..., None], along)[..., 0] / 2.0
+        for whole, cut_rows in (
+            (center, strips.frames.center),
+            (side, strips.frames.side),
+            (tangent, strips.frames.tangent),
+        ):
+            whole[cards] = interpolated_rows(cut_rows, along, strips.places)
+        half[cards] = interpolated_rows(strips.width[..., None], along, strips.places)[..., 0] / 2.0
     present = np.flatnonzero(cut.segments[cut.represented_by])
     owner = cut.represented_by[present]
     away = strip_edges(finest.select(present)) - center[owner][:, :, None]

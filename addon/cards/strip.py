@@ -47,10 +47,16 @@ class CardFrames:
 
 @dataclass(frozen=True)
 class Strips:
-    """Strips with the same number of rows. width: (card_count, row_count) [m]."""
+    """Strips with the same number of rows.
+
+    width: (card_count, row_count) [m].
+    along: (card_count, row_count) place of each row, 0 at the root and 1 at the tip; None: evenly
+        spaced.
+    """
 
     frames: CardFrames
     width: Floats
+    along: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.width)
@@ -59,7 +65,16 @@ class Strips:
         """The strips of the chosen cards."""
         frames = self.frames
         parts = (frames.center, frames.tangent, frames.normal, frames.side)
-        return Strips(CardFrames(*(part[cards] for part in parts)), self.width[cards])
+        along = None if self.along is None else self.along[cards]
+        return Strips(CardFrames(*(part[cards] for part in parts)), self.width[cards], along)
+
+    @property
+    def places(self) -> Floats:
+        """Place of each row, (card_count, row_count) float32, or (1, row_count) where all strips
+        are evenly cut."""
+        if self.along is not None:
+            return self.along
+        return np.linspace(0.0, 1.0, self.width.shape[1], dtype=np.float32)[None]
 
 
 @dataclass(frozen=True)
@@ -141,7 +156,7 @@ def _mesh_of_part(
     frames = strips.frames
     card_count, row_count = strips.width.shape
     across = np.linspace(0.0, 1.0, column_count + 1, dtype=np.float32)
-    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)[:, None]
+    along = strips.places[..., None]
     triangles = strip_triangles(row_count, column_count)
     vertices_per_card = row_count * len(across)
     first = np.arange(card_count, dtype=np.int32) * vertices_per_card
@@ -242,13 +257,12 @@ def _positions(frames: CardFrames, width: Floats, across: Floats, settings: Card
     )
 
 
-def root_slants(row_count: int) -> Floats:
-    """How much of the slope of its root edge each row of a card has, (row_count,) float32.
+def root_slants(along: Floats) -> Floats:
+    """How much of the slope of its root edge a card has at places along it, (...) float32.
 
     Where hair leaves a hairline or a parting at an angle, the roots of a card lie on a slanted
     line. Its first rows follow them: 1 at the root, 0 from a quarter of the card on.
     """
-    along = np.linspace(0.0, 1.0, row_count, dtype=np.float32)
     return np.maximum(np.float32(1.0) - along / np.float32(_SLANTED_PART), np.float32(0.0))
 
 
@@ -256,7 +270,7 @@ def _slanted(strips: Strips, slope: Floats, across: Floats) -> Floats:
     """How far vertices move along cards whose root edges have this slope, (cards, rows, columns,
     3) [m]."""
     aside = (across - 0.5) * strips.width[..., None]
-    ahead = aside * (slope[:, None] * root_slants(strips.width.shape[1]))[..., None]
+    ahead = aside * (slope[:, None] * root_slants(strips.places))[..., None]
     moved: Floats = strips.frames.tangent[:, :, None] * ahead[..., None]
     return moved
 

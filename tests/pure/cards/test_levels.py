@@ -13,8 +13,9 @@ from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.joining import join_pairs, pairs_to_join
 from hairloom.addon.cards.levels import card_levels
+from hairloom.addon.cards.segments import with_segments
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.strip import CardFrames, Strips, UncutCards
+from hairloom.addon.cards.strip import CardFrames, Strips, UncutCards, strip_mesh
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import closest_point
 from hairloom.addon.strands.frames import tangents, transported_normals
@@ -196,3 +197,64 @@ def test_neighbours_are_those_that_brute_force_finds() -> None:
     place = cards.strips.frames.center[:, rows].reshape(60, -1)
     gap = ((place[:, None] - place) ** 2).sum(axis=2) + np.eye(60) * 1e9
     assert set(pairs[0].tolist()) == set(np.unravel_index(gap.argmin(), gap.shape))
+
+
+def hook(row_count: int = 41, arc: float = 0.2) -> Strips:
+    """One flat card that turns by 90 degrees in its first part and is straight behind that."""
+    along = np.linspace(0.0, 1.0, row_count)
+    radius = arc / (np.pi / 2.0)
+    turn = np.minimum(along, arc) / radius
+    behind = np.maximum(along - arc, 0.0)
+    center = np.zeros((1, row_count, 3), np.float32)
+    center[0, :, 0] = radius * (1.0 - np.cos(turn)) + behind
+    center[0, :, 2] = radius * np.sin(turn)
+    tangent = tangents(center)
+    normal = np.cross(tangent, np.float32([0.0, 1.0, 0.0]))
+    frames = CardFrames(center, tangent, normal, np.cross(tangent, normal))
+    return Strips(frames, np.full((1, row_count), 0.01, np.float32))
+
+
+def deviation(line: np.ndarray, corners: np.ndarray) -> float:
+    """The largest distance of a line's points from the nearest of the segments between corners."""
+    begin, step = corners[:-1], np.diff(corners, axis=0)
+    away = line[:, None] - begin
+    fraction = np.clip((away * step).sum(axis=-1) / (step * step).sum(axis=-1), 0.0, 1.0)
+    return float(np.linalg.norm(away - fraction[..., None] * step, axis=-1).min(axis=1).max())
+
+
+def test_rows_lie_closer_where_a_card_bends() -> None:
+    """With as many rows, the card stays three times as close to its hair as with even ones."""
+    strips, segments = hook(), 6
+    line = strips.frames.center[0]
+    cut = with_segments(strips, np.arange(1), segments)
+    places = cut.places[0]
+    even = line[np.round(np.linspace(0, len(line) - 1, segments + 1)).astype(int)]
+    assert deviation(line, cut.frames.center[0]) < deviation(line, even) / 3.0
+    assert places[0] == 0.0 and places[-1] == 1.0 and (np.diff(places) > 0.0).all()
+    np.testing.assert_allclose(cut.frames.center[0, :, 1], 0.0, atol=1e-7)
+
+
+def test_rows_of_straight_cards_are_close_at_the_root_and_even_behind_it() -> None:
+    steps = np.diff(with_segments(hook(arc=1e-6), np.arange(1), 12).places[0])
+    assert steps[0] < steps[-1] / 3.0
+    np.testing.assert_allclose(steps[-4:], steps[-1], rtol=0.05)
+
+
+def test_cards_with_a_row_at_each_cv_keep_all_rows() -> None:
+    whole = with_segments(hook(), np.arange(1), 40)
+    np.testing.assert_array_equal(whole.frames.center, hook().frames.center)
+
+
+def test_the_texture_does_not_slide_along_unevenly_cut_cards() -> None:
+    """A vertex shows the same place of the strands as without a cut: its place along the card."""
+    strips = hook()
+    numbers, none = np.arange(1), np.zeros(1, np.int32)
+    cards = UncutCards(strips, none + 5, none, none, none, AtlasGrid(columns=1))
+    settings = CardSettings(column_count=2, bend=0.0)
+    cut = with_segments(strips, numbers, 6)
+    mesh = strip_mesh([(numbers, cut)], cards, 2, settings)
+    whole = np.linspace(0.0, 1.0, strips.width.shape[1])
+    for axis in (0, 2):
+        expected = np.interp(mesh.along, whole, strips.frames.center[0, :, axis])
+        np.testing.assert_allclose(mesh.positions[:, axis], expected, atol=1e-6)
+    np.testing.assert_allclose(mesh.uv[:, 1], mesh.along, atol=1e-6)
