@@ -55,6 +55,11 @@ def damaged(content: bytes, number: int) -> bytes:
     return bytes(result)
 
 
+def peak_of_children() -> int:
+    """The most memory that any process took which this one has started [bytes]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+
+
 @pytest.fixture
 def exported(
     sphere: Any, new_hair: Callable[..., Any], tmp_path: Path
@@ -86,6 +91,7 @@ def test_damaged_grooms_of_blender_are_read_or_refused(
 ) -> None:
     """In time, and without filling the memory."""
     path, content = exported(suffix)
+    allowed = max(MAX_MEMORY, peak_of_children())  # other tests may have started larger ones
     for number in numbers:
         path.write_bytes(damaged(content, number))
         started = time.perf_counter()
@@ -94,8 +100,7 @@ def test_damaged_grooms_of_blender_are_read_or_refused(
         except HairloomError as error:
             assert path.name in error.place and error.remedy, number
         assert time.perf_counter() - started < MAX_SECONDS, number
-        peak = 1024 * resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-        assert peak < MAX_MEMORY, number
+        assert peak_of_children() <= allowed, number
 
 
 @needs_usd
