@@ -70,6 +70,11 @@ class AppliedEdits:
         """The numbers of the kept cards."""
         return np.unique(self.kept_mesh.card)
 
+    @property
+    def kept_triangles(self) -> Ints:
+        """(card_count,) triangles of each kept card; 0 of the others."""
+        return np.bincount(self.kept_mesh.card, minlength=len(self.cards))
+
     def with_kept_mesh(self, mesh: CardMesh) -> CardMesh:
         """The finest level with the kept cards as they are."""
         is_made = ~np.isin(mesh.card, self.kept_numbers)

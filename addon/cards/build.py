@@ -157,7 +157,8 @@ def card_steps(
     error = None
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
-    levels = card_levels(cards, settings, error, None if applied is None else applied.kept_numbers)
+    kept = None if applied is None else applied.kept_triangles
+    levels = card_levels(cards, settings, error, kept)
     record = record.with_joined_cards(levels[0].represented_by)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
     meshes = tuple(lift_roots(mesh, groom.head, median_width) for mesh in meshes)

@@ -69,16 +69,27 @@ class _Cut:
 
 
 def card_levels(
-    cards: UncutCards, settings: CardSettings, error: float | None, protected: Ints | None = None
+    cards: UncutCards,
+    settings: CardSettings,
+    error: float | None,
+    kept_triangles: Ints | None = None,
 ) -> tuple[CardLevel, ...]:
     """The levels, finest first: as many as the settings say, or fewer if the triangles can no
     longer be halved.
 
     Args:
         error: allowed for rows of the finest level [m]; None keeps all rows.
-        protected: cards that the finest level must not join with others.
+        kept_triangles: (card_count,) triangles of cards that the artist's own replace in the finest
+            level: it must not join them with others, and coarser ones have no more; 0: replaced by
+            none.
     """
-    cuts = [_within_budget(_finest(cards, settings, error), cards.group, settings, protected)]
+    finest = _finest(cards, settings, error)
+    protected = None
+    if kept_triangles is not None:
+        protected = np.flatnonzero(kept_triangles)
+        own = -(-kept_triangles[protected] // (2 * settings.column_count))
+        finest.segments[protected] = np.minimum(finest.segments[protected], own)
+    cuts = [_within_budget(finest, cards.group, settings, protected)]
     while cuts[-1].triangle_count and len(cuts) < settings.levels:
         target = cuts[-1].triangle_count / 2.0
         coarser = _coarser(cuts[-1], cards.group, settings.segment_count, target)

@@ -372,7 +372,8 @@ def faces(obj, card):
 
 def test_coarser_levels_follow_the_edited_shape(hair):
     """The coarser level follows a card that was moved and enlarged, and lacks a deleted card."""
-    hair.data.hairloom.cards.column_count, hair.data.hairloom.cards.error = 1, 0.05
+    cards = hair.data.hairloom.cards
+    cards.column_count, cards.error, cards.bend = 2, 0.02, 0.0
     obj = make(hair)
     coarse = of_card(card_objects(hair)[1], 3)
     assert len(coarse), "it is not joined with another"

@@ -33,6 +33,12 @@ def grid(obj, card):
     return np.array([found[key] for key in sorted(found)]).reshape(9, 3, 3)
 
 
+def row_places(obj, card):
+    """Place of each row along a card, from 0 at the root to 1, (9,)."""
+    places = np.unique(corners(obj, card, "UVMap")[:, 1].round(5))
+    return (places - places[0]) / (places[-1] - places[0])
+
+
 def widths(rows):
     return np.linalg.norm(rows[:, 2] - rows[:, 0], axis=1)
 
@@ -42,7 +48,7 @@ def test_width_grows_evenly_to_the_tip_about_the_middle(hair):
     before, other = grid(obj, 3), corners(obj, 4)
     assert apply(obj, (3,), bpy.ops.hairloom.card_width, root=1.0, tip=2.0) == {"FINISHED"}
     now = grid(obj, 3)
-    factor = np.linspace(1.0, 2.0, 9)
+    factor = 1.0 + row_places(obj, 3)
     np.testing.assert_allclose(widths(now), widths(before) * factor, rtol=1e-4)
     np.testing.assert_allclose(now[:, 0] + now[:, 2], before[:, 0] + before[:, 2], atol=1e-6)
     np.testing.assert_array_equal(corners(obj, 4), other)
@@ -63,7 +69,7 @@ def test_twist_turns_the_tip_by_the_angle_and_keeps_widths(hair):
     axis = np.gradient(middle, axis=0)
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     ahead = (np.einsum("ri,ri->r", across[0], axis) / widths(before)) ** 2
-    turn = np.linspace(0.0, np.pi / 2.0, 9)
+    turn = row_places(obj, 3) * np.pi / 2.0
     np.testing.assert_allclose(cosine, np.cos(turn) * (1.0 - ahead) + ahead, atol=1e-3)
 
 
@@ -183,7 +189,8 @@ def test_without_numbers_a_curve_gets_the_width_and_tile_of_its_neighbours(hair,
     line.select_set(True)
     assert bpy.ops.hairloom.add_card_along_curve() == {"FINISHED"}
     card = grid(obj, -1)
-    usual = np.median([widths(grid(obj, each))[4] for each in range(12)])
+    halfway = [np.interp(0.5, row_places(obj, n), widths(grid(obj, n))) for n in range(12)]
+    usual = np.median(halfway)
     np.testing.assert_allclose(widths(card)[0], usual, rtol=0.1)
     assert int(corners(obj, -1, "UVMap")[:, 0].mean() * 4) == tile[3]
 

@@ -258,3 +258,16 @@ def test_the_texture_does_not_slide_along_unevenly_cut_cards() -> None:
         expected = np.interp(mesh.along, whole, strips.frames.center[0, :, axis])
         np.testing.assert_allclose(mesh.positions[:, axis], expected, atol=1e-6)
     np.testing.assert_allclose(mesh.uv[:, 1], mesh.along, atol=1e-6)
+
+
+def test_no_level_gives_an_artists_own_card_more_triangles_than_it_has() -> None:
+    cards = fall(60)
+    kept = np.where(np.arange(60) == 7, 4, 0)
+    settings = CardSettings(levels=3, column_count=2)
+    for level, usual in zip(
+        card_levels(cards, settings, 0.0002, kept),
+        card_levels(cards, settings, 0.0002),
+        strict=True,
+    ):
+        own, made = (int((each.mesh.card == 7).sum()) for each in (level, usual))
+        assert own <= 4 < made
