@@ -41,9 +41,9 @@ NEAR, FAR = 0.05, 5.0
 
 MAX_MEAN_DIFFERENCE = 1.0 / 255.0
 #: Largest fraction of pixels that may differ by more than 8 / 255: engines make mip maps in another
-#: way, which sharp highlights show. Without denser alpha at grazing angles, baked cards would reach
-#: 0.022.
-MAX_DIFFERENT_FRACTION = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.015}
+#: way, which sharp highlights show, and thin cards that are nearly edge-on cover other pixels.
+#: Without denser alpha at grazing angles, baked cards would reach 0.034.
+MAX_DIFFERENT_FRACTION = {"kajiya_kay": 0.03, "marschner": 0.005, "baked": 0.022}
 
 
 @dataclass(frozen=True)
