@@ -10,8 +10,9 @@ from .strip import CardFrames, Strips
 
 #: Numbers of segments that are tried.
 _SEGMENT_COUNTS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)
-#: Density of a strip's rows: evenly spaced; where it bends, 0.7 on average; and at the
-#: root, within about this part of the strip: light and skin change fastest there. Measured: a bob.
+#: The density of rows is the sum of an even part, of one where the strip bends, which makes both
+#: together 1 on average, and of one that fades within this part of the strip from its root, where
+#: light and skin change fastest. Measured on a bob.
 _EVEN_DENSITY, _ROOT_DENSITY, _ROOT_PART = 0.3, 2.0, 0.08
 #: Bends below this fraction of the distance between CVs are rounding.
 _STRAIGHT = 1e-3

@@ -18,12 +18,10 @@ from ...render.good_side import GoodSide, good_side
 from ...render.light_samples import lights_at
 from ...render.scene_pass import ScenePass
 from ...render.scene_snapshot import DrawnGroom, SceneSnapshot
-from ...render.snapshot import MeshSnapshot
+from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_layers import LayerStatistics
 from ...render.strand_pass import Statistics
 from ...rig_flow import Pose
-from ...shading.lights import Light
-from ...shading.stage import backdrop, over_backdrop
 from ...strands import Surface
 from ...strands.join import join_strands
 from .studio import Studio
@@ -56,55 +54,41 @@ class GroupStudio(Studio):
         self._scene_pass, self._target = ScenePass(), Target()
         self._sum = Accumulation()
 
-    def picture(
+    def _draw(
         self,
-        pose: Pose,
-        points: Floats,
+        snapshot: Snapshot,
+        camera: Camera,
         width: int,
         height: int,
         samples: int,
-        camera: Camera | None = None,
-        *,
-        lights: tuple[Light, ...] | None = None,
-        guides: Floats | None = None,
-        is_transparent: bool = False,
         is_soft: bool = True,
         on_sample: Callable[[int], object] = lambda done: None,
     ) -> Floats:
-        """As `Studio.picture`, with all companions; `pose` and `points` are those of its own
-        groom."""
-        camera = camera or self._camera(width / height)
-        lights = self.lights(camera) if lights is None else lights
+        """As `Studio._draw`, with all companions beside this snapshot."""
+        meshes, lights = snapshot.meshes, snapshot.lights
+        own = replace(snapshot, meshes=(), lights=())
         others = (
             each.studio.snapshot(each.pose, each.points, each.guides) for each in self.companions
         )
-        meshes = self._meshes_of_all(pose)
         scene = SceneSnapshot(
             meshes=meshes,
             casters=meshes,
-            grooms=tuple(
-                DrawnGroom(number, snapshot)
-                for number, snapshot in enumerate((self.snapshot(pose, points, guides), *others))
-            ),
-            ambient=self.stage.ambient,
+            grooms=tuple(DrawnGroom(number, hair) for number, hair in enumerate((own, *others))),
+            ambient=snapshot.ambient,
         )
         self._sum.begin(width, height)
         count = self.sample_count(samples)
         for sample in range(count):
             on_sample(sample)
             place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
-            lit = replace(
-                scene, lights=lights_at(lights, sample, self._ball.center) if is_soft else lights
-            )
+            lit = lights_at(lights, sample, self._ball.center) if is_soft else lights
             moved = jittered(camera, place, width, height, sample)
-            self._scene_pass.draw(lit, moved, self._target, (width, height), _NOTHING)
+            now = replace(scene, lights=lit)
+            self._scene_pass.draw(now, moved, self._target, (width, height), _NOTHING)
             self._sum.add(self._target.color)
         on_sample(count)
         self._notes |= dict.fromkeys(self._scene_pass.notes)
-        picture = self._sum.mean()
-        if is_transparent:
-            return picture
-        return over_backdrop(picture, backdrop(self.stage, width, height))
+        return self._sum.mean()
 
     def show_look(self, *look: Settings) -> None:
         """Draw all grooms with these settings; with none, each with its own."""
@@ -152,7 +136,7 @@ class GroupStudio(Studio):
         others = [each.studio.strand_middles(each.points) for each in self.companions]
         return np.concatenate([super().strand_middles(points), *others])
 
-    def _meshes_of_all(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
+    def _meshes_of_picture(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
         """Each head once, with the ambient light that all hair on it lets through."""
         heads: list[tuple[Studio, Pose, Floats | None]] = []
         own = [(self, pose), *((each.studio, each.pose) for each in self.companions)]

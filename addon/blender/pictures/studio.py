@@ -113,7 +113,7 @@ class Studio:
         camera = camera or self._camera(width / height)
         snapshot = replace(
             self.snapshot(pose, points, guides),
-            meshes=self.meshes(pose),
+            meshes=self._meshes_of_picture(pose),
             lights=self.lights(camera) if lights is None else lights,
             ambient=self.stage.ambient,
         )
@@ -341,6 +341,9 @@ class Studio:
         """The middle point of each strand, (strand_count, 3) [m]; points as for `picture`."""
         offsets = self._rig.strands.offsets
         return points.reshape(-1, 3)[(offsets[:-1] + offsets[1:]) // 2]
+
+    def _meshes_of_picture(self, pose: Pose) -> tuple[MeshSnapshot, ...]:
+        return self.meshes(pose)
 
     def meshes(self, pose: Pose, occlusion: Floats | None = None) -> tuple[MeshSnapshot, ...]:
         """The parts of the head in this pose; none without a head.
