@@ -18,9 +18,9 @@ from itertools import pairwise
 
 import numpy as np
 from _cards_groom import sintel_rig
-from _forms import ComputeForm, Form, NumpyForm, has_compute
 from _report import chosen, report
 from _report import start as start_bench
+from _simulations import ComputeSimulation, NumpySimulation, Simulation, has_compute
 from shaken import GRAVITY
 
 from hairloom.addon import motion_flow, rig_flow
@@ -135,7 +135,7 @@ def fast_shake(centre: np.ndarray) -> Motion:
 
 
 def shaken(
-    rig: Rig, motion: Motion, seconds: float, make: Callable[..., Form], every: int = 1
+    rig: Rig, motion: Motion, seconds: float, make: Callable[..., Simulation], every: int = 1
 ) -> dict[str, float]:
     """Depths of every n-th guide of a groom in its head, which moves rigidly and collides as a
     mesh."""
@@ -144,7 +144,7 @@ def shaken(
     collider = DistanceField.from_surface(rig.head, settings)
     rest = motion_flow.carried_guides(rig, rig.rest_pose)[::every]
     depths = Depths.of(rest, rig.head)
-    form = make(start(rest))
+    simulation = make(start(rest))
     matrices = [motion(frame / FPS) for frame in range(round(seconds * FPS) + 1)]
     targets = [rest]
     for frame, now in enumerate(matrices[1:], 1):
@@ -156,9 +156,9 @@ def shaken(
         drive = Drive(
             targets[-2], targets[-1], (posed,), GRAVITY, targets[-3] if frame > 1 else None
         )
-        form.advance(drive, settings, 1.0 / FPS)
-        depths.note(form.state().grid, now)
-    form.release()
+        simulation.advance(drive, settings, 1.0 / FPS)
+        depths.note(simulation.state().grid, now)
+    simulation.release()
     return depths.worst
 
 
@@ -204,7 +204,7 @@ def ear(settings: DynamicsSettings) -> Thin:
 
 
 def swung(
-    thin: Thin, make: Callable[..., Form], settings: DynamicsSettings, speed: float = 5.6
+    thin: Thin, make: Callable[..., Simulation], settings: DynamicsSettings, speed: float = 5.6
 ) -> dict[str, float]:
     """Move a solid through hanging hair, a substep at a time, and count strands that pass through
     it."""
@@ -215,21 +215,21 @@ def swung(
     grid[:, :, 2] = along
     grid[:, :, 1] = np.linspace(0.0, 0.003, count)[:, None]
     depths = Depths.of(moved(np.linalg.inv(place(-0.15)), grid), thin.surface)
-    form, step = make(start(grid)), 1.0 / settings.substep_rate
+    simulation, step = make(start(grid)), 1.0 / settings.substep_rate
     passed = np.zeros(count, bool)
     matrices = [place(-0.15 + speed * step * k) for k in range(round(0.3 / speed / step) + 1)]
     before = dense(grid)
     for was, now in pairwise(matrices):
-        form.advance(
+        simulation.advance(
             Drive(grid, grid, (PosedCollider(thin.collider, was, now),), GRAVITY), settings, step
         )
-        here = form.state().grid
+        here = simulation.state().grid
         depths.note(here, now)
         after = dense(here)
         paths = moved(np.linalg.inv(was), before), moved(np.linalg.inv(now), after)
         passed |= crosses(*paths, thin.core)[:, : -2 * SAMPLES].any(axis=1)
         before = after
-    form.release()
+    simulation.release()
     return {"passed": float(passed.sum()), **depths.worst}
 
 
@@ -324,7 +324,9 @@ def eared_ball() -> tuple[Surface, np.ndarray]:
 HEADS: dict[str, Callable[[], Rig]] = {"sintel": sintel_rig, "built_in": built_in_rig}
 
 
-def figures(make: Callable[..., Form], case_names: Sequence[str]) -> dict[str, dict[str, float]]:
+def figures(
+    make: Callable[..., Simulation], case_names: Sequence[str]
+) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     settings = DynamicsSettings()
     for name, solid in (
@@ -358,7 +360,7 @@ def main(arguments: list[str]) -> int:
     if use_compute and not has_compute():
         raise SystemExit("There are no compute shaders here.")
     parts = chosen([each for each in arguments if each != "compute"], ("thin", *HEADS))
-    found = figures(ComputeForm if use_compute else NumpyForm, parts)
+    found = figures(ComputeSimulation if use_compute else NumpySimulation, parts)
     flat = {f"{name}_{key}": value for name, part in found.items() for key, value in part.items()}
     device = {"device": "compute shaders" if use_compute else "numpy"}
     return report(device | flat, REFERENCE, max_limits=MAX_LIMITS)

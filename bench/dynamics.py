@@ -21,10 +21,10 @@ from typing import Any
 
 import bpy
 import numpy as np
-from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _hair_dynamics import HairDynamics, animate
 from _report import report
 from _shaken_head import RADIUS, Shake, depth_in, guides_on, new_head, surface_of, sway
+from _simulations import ComputeSimulation, NumpySimulation, Simulation, has_compute, play
 from _turns import in_turns
 
 from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
@@ -49,7 +49,7 @@ FRAMES = WARM_UP + SWING  # of a play; one whole swing is measured
 SIZES = (1_000, 3_000, 10_000, 30_000, 50_000)
 FRAME_RATES = (24.0, 30.0, 60.0, 120.0)
 SETTINGS = DynamicsSettings()
-Forms = dict[str, Callable[[DynamicsState], Form]]
+Simulations = dict[str, Callable[[DynamicsState], Simulation]]
 
 
 def main() -> int:
@@ -57,21 +57,21 @@ def main() -> int:
     options.add_argument("--peer-10k", action="store_true", help="the peer with 10,000 guides too")
     options.add_argument("--rounds", type=int, default=ROUNDS, help="in which all take turns")
     arguments = options.parse_args()
-    forms: Forms = {"numpy": NumpyForm}
+    simulations: Simulations = {"numpy": NumpySimulation}
     if has_compute():
-        forms["compute"] = ComputeForm
+        simulations["compute"] = ComputeSimulation
     head = new_head()
     surface = surface_of(head)
     field = DistanceField.from_surface(surface, SETTINGS, place="head")
     guides = guides_on(surface, GUIDES)
 
     found: dict[str, Any] = dict.fromkeys(("compute_ms", "ratio_compute"))
-    found |= race(forms, head, guides, field, arguments.rounds)
-    for name in forms:
+    found |= race(simulations, head, guides, field, arguments.rounds)
+    for name in simulations:
         found[f"ratio_{name}"] = found["hair_dynamics_ms"] / found[f"{name}_ms"]
-    found |= accuracy(forms, guides, surface, field)
-    found |= scaling(forms, surface, field)
-    for name, make in forms.items():
+    found |= accuracy(simulations, guides, surface, field)
+    found |= scaling(simulations, surface, field)
+    for name, make in simulations.items():
         found["framerate_tip_percent" if name == "numpy" else f"{name}_framerate_tip_percent"] = (
             frame_rates(make, guides, field)
         )
@@ -81,7 +81,7 @@ def main() -> int:
 
 
 def race(
-    forms: Forms,
+    simulations: Simulations,
     head: bpy.types.Object,
     guides: StrandSet,
     field: DistanceField,
@@ -104,11 +104,11 @@ def race(
         peer.remove()
         return statistics.median(times)
 
-    def plays(make: Callable[[DynamicsState], Form], shaken: Shake) -> float:
+    def plays(make: Callable[[DynamicsState], Simulation], shaken: Shake) -> float:
         return statistics.median(timed(make, shaken, FRAMES / FPS))
 
     contestants: dict[str, Callable[[], float]] = {"hair_dynamics_ms": peer_plays}
-    for name, make in forms.items():
+    for name, make in simulations.items():
         contestants[f"{name}_ms"] = partial(plays, make, shake)
         contestants[f"{name}_sphere_ms"] = partial(plays, make, balls)
     medians = in_turns(contestants, rounds)
@@ -120,15 +120,15 @@ def race(
     }
 
 
-def timed(make: Callable[[DynamicsState], Form], shake: Shake, seconds: float) -> list[float]:
-    form = make(start(shake.grid))
-    times = play(form, shake.drives(FPS, seconds), SETTINGS, FPS)
-    form.release()
+def timed(make: Callable[[DynamicsState], Simulation], shake: Shake, seconds: float) -> list[float]:
+    simulation = make(start(shake.grid))
+    times = play(simulation, shake.drives(FPS, seconds), SETTINGS, FPS)
+    simulation.release()
     return times[WARM_UP:]
 
 
 def accuracy(
-    forms: Forms, guides: StrandSet, surface: Surface, field: DistanceField
+    simulations: Simulations, guides: StrandSet, surface: Surface, field: DistanceField
 ) -> dict[str, float]:
     """The worst stretch and penetration of all implementations over two seconds.
 
@@ -155,15 +155,15 @@ def accuracy(
         note("penetration_mesh_mm", depth(free) * 1000.0)
 
     sphere = SphereCollider((0.0, 0.0, 0.0), RADIUS)
-    for make in forms.values():
+    for make in simulations.values():
         for collider, watch in ((sphere, watch_sphere), (field, watch_mesh)):
-            form = make(start(guides.grid))
-            play(form, Shake(guides.grid, (collider,)).drives(FPS, 2.0), SETTINGS, FPS, watch)
-            form.release()
+            simulation = make(start(guides.grid))
+            play(simulation, Shake(guides.grid, (collider,)).drives(FPS, 2.0), SETTINGS, FPS, watch)
+            simulation.release()
     return max_values
 
 
-def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, float]:
+def scaling(simulations: Simulations, surface: Surface, field: DistanceField) -> dict[str, float]:
     """Milliseconds per frame for growing numbers of guides, and the exponent that fits them
     best."""
     all_guides = guides_on(surface, SIZES[-1]).grid
@@ -171,7 +171,7 @@ def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, f
     shakes = {size: Shake(all_guides[np.sort(chosen[:size])], (field,)) for size in SIZES}
     medians: dict[str, list[float]] = {}
     for _ in range(SCALING_ROUNDS):
-        for name, make in forms.items():
+        for name, make in simulations.items():
             for size, shake in shakes.items():
                 seconds = (WARM_UP + (20 if size <= 10_000 else 6)) / FPS
                 times = timed(make, shake, seconds)
@@ -179,23 +179,25 @@ def scaling(forms: Forms, surface: Surface, field: DistanceField) -> dict[str, f
                     statistics.median(times)
                 )
     found = {name: min(values) for name, values in medians.items()}
-    for name in forms:
+    for name in simulations:
         times = [found[f"{name}_{size // 1000}k_ms"] for size in SIZES]
         found[f"{name}_scaling_exponent"] = float(np.polyfit(np.log(SIZES), np.log(times), 1)[0])
-    return found | {"scaling_exponent": max(found[f"{name}_scaling_exponent"] for name in forms)}
+    return found | {
+        "scaling_exponent": max(found[f"{name}_scaling_exponent"] for name in simulations)
+    }
 
 
 def frame_rates(
-    make: Callable[[DynamicsState], Form], guides: StrandSet, field: DistanceField
+    make: Callable[[DynamicsState], Simulation], guides: StrandSet, field: DistanceField
 ) -> float:
     """The largest distance of a guide's tip, after two seconds, between two frame rates, in percent
     of the guide's length."""
     tips = []
     for fps in FRAME_RATES:
-        form = make(start(guides.grid))
-        play(form, Shake(guides.grid, (field,)).drives(fps, 2.0), SETTINGS, fps)
-        tips.append(form.state().grid[:, -1])
-        form.release()
+        simulation = make(start(guides.grid))
+        play(simulation, Shake(guides.grid, (field,)).drives(fps, 2.0), SETTINGS, fps)
+        tips.append(simulation.state().grid[:, -1])
+        simulation.release()
     apart = [np.linalg.norm(one - other, axis=1) for one in tips for other in tips]
     return float((np.max(apart, axis=0) / guides.lengths()).max() * 100.0)
 

@@ -18,9 +18,9 @@ import traceback
 from dataclasses import dataclass, field
 
 import numpy as np
-from _forms import ComputeForm, Form, NumpyForm, play
 from _random_runs import RandomRun, promises_length, random_run, reach_of, shaken
 from _report import report, start
+from _simulations import ComputeSimulation, NumpySimulation, Simulation, play
 
 from hairloom.addon.dynamics.state import DynamicsState
 from hairloom.addon.dynamics.step import Drive
@@ -63,7 +63,9 @@ def main() -> int:
         "worst_seed": tally.worst_seed,
     }
     if arguments.minutes:
-        found |= shake(ComputeForm if arguments.compute else NumpyForm, arguments.minutes)
+        found |= shake(
+            ComputeSimulation if arguments.compute else NumpySimulation, arguments.minutes
+        )
     found["seconds"] = time.perf_counter() - begin
     return report(found, REFERENCE, max_limits=MAX_LIMITS)
 
@@ -82,13 +84,13 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
             problem = "not finite"
 
     state = run.begin()
-    form: Form = ComputeForm(state) if compute else NumpyForm(state)
+    simulation: Simulation = ComputeSimulation(state) if compute else NumpySimulation(state)
     try:
-        play(form, run.drives(SECONDS), run.settings, run.fps, watch)
+        play(simulation, run.drives(SECONDS), run.settings, run.fps, watch)
     except Exception:  # any exception is a failure of this seed, and the others go on
         traceback.print_exc()
         problem = "raised"
-    form.release()
+    simulation.release()
     tally.runs += 1
     if ratio > tally.worst_ratio:
         tally.worst_ratio, tally.worst_seed = ratio, seed
@@ -97,7 +99,9 @@ def note(tally: Tally, seed: int, run: RandomRun, *, compute: bool) -> None:
         print(f"seed {seed}: {tally.failures[seed]}", flush=True)
 
 
-def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str, object]:
+def shake(
+    make: type[NumpySimulation] | type[ComputeSimulation], minutes: float
+) -> dict[str, object]:
     """Shake a head in gusts for minutes: hair must keep its length, and its top speed may grow by
     less than half from the first quarter of the time to the last."""
     run = shaken(guide_count=60)
@@ -111,9 +115,9 @@ def shake(make: type[NumpyForm] | type[ComputeForm], minutes: float) -> dict[str
             float(np.sqrt((displacement * displacement).sum(axis=0)).max()) / state.substep
         )
 
-    form = make(run.begin())
-    play(form, run.drives(60.0 * minutes), run.settings, run.fps, watch)
-    form.release()
+    simulation = make(run.begin())
+    play(simulation, run.drives(60.0 * minutes), run.settings, run.fps, watch)
+    simulation.release()
     quarter = len(speeds) // 4
     begin, end = max(speeds[:quarter]), max(speeds[-quarter:])
     return {

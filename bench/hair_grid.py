@@ -39,10 +39,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 from _field_particles import field_error
-from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _report import report
 from _report import start as start_bench
 from _shaken_head import Shake, guides_on, new_head, surface_of
+from _simulations import ComputeSimulation, NumpySimulation, Simulation, has_compute, play
 from _style_follow import style_follow
 from grooms_together import Groom, play_frame
 
@@ -246,9 +246,9 @@ def costs(name: str, count: int) -> dict[str, object]:
     drives = list(Shake(guides.grid, (field,)).drives(FPS, 0.5))
     fields = ForceFields(FIELDS, np.random.default_rng(1).permutation(256))
     blown = [replace(drive, force_fields=fields) for drive in drives]
-    makers: dict[str, Callable[[DynamicsState], Form]] = {"numpy": NumpyForm}
+    makers: dict[str, Callable[[DynamicsState], Simulation]] = {"numpy": NumpySimulation}
     if has_compute():
-        makers["compute"] = ComputeForm
+        makers["compute"] = ComputeSimulation
     kinds = {"": (0.0, drives), "volume": (0.5, drives), "fields": (0.0, blown)}
     times: dict[tuple[str, str], list[list[float]]] = {}
     for _ in range(ROUNDS[name]):

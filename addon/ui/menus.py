@@ -15,7 +15,7 @@ from .drawing import draw_overlays
 from .operators_card_edits import draw_menu
 from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
-from .selection import active_mesh, chosen_hair
+from .selection import active_mesh, target_hair
 
 _PIE = "HAIRLOOM_MT_pie"
 #: (operator, settings) of shortcuts that are offered in the keymap of the 3D view, without keys
@@ -130,7 +130,7 @@ def _draw_object(self: Any, context: bpy.types.Context) -> None:
 
 def _draw_overlays(self: Any, context: bpy.types.Context) -> None:
     """Overlays of the selected hair, below Blender's own overlays of objects."""
-    hair = chosen_hair(context)
+    hair = target_hair(context)
     if not hair:
         return
     column = self.layout.column()

@@ -19,7 +19,7 @@ from .help import WithHelp
 from .long_work import LongWork, Steps, can_start, counted, draw_progress
 from .operators_measure import draw_figures
 from .reports import reporting
-from .selection import chosen_hair
+from .selection import target_hair
 from .texts import translated
 
 
@@ -87,7 +87,7 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The objects that the buttons apply to: hair, as for other buttons, and selected fins."""
     return list(
-        dict.fromkeys(filter(is_bakeable, (*chosen_hair(context), *context.selected_objects)))
+        dict.fromkeys(filter(is_bakeable, (*target_hair(context), *context.selected_objects)))
     )
 
 

@@ -18,7 +18,7 @@ from ..blender.cards.hand_tools import (
 )
 from ..blender.cards.made_objects import card_objects
 from .reports import reporting
-from .selection import chosen_hair, in_object_mode, needs_hair
+from .selection import in_object_mode, needs_hair, target_hair
 
 _MENU = "HAIRLOOM_MT_card_edits"
 _STEPS = {"next": 1, "previous": -1}
@@ -187,7 +187,7 @@ class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if not card_objects(chosen_hair(context)[0]):
+        if not card_objects(target_hair(context)[0]):
             cls.poll_message_set("There are no cards yet: press Make Cards first")
             return False
         if not _curves(context):
@@ -199,7 +199,7 @@ class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
-        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
+        hair, depsgraph = target_hair(context)[0], context.evaluated_depsgraph_get()
         count = add_along_curves(hair, _curves(context), depsgraph, self.width, self.tile - 1)
         added = "1 card was added" if count == 1 else f"{count:,} cards were added"
         name = card_objects(hair)[0].name

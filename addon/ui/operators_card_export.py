@@ -28,7 +28,7 @@ from .file_paths import FILE_TO_WRITE
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import report_outcome
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 _FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
 
@@ -93,7 +93,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         return cls.can_start() and (bool(bpy.data.hair_curves) or needs_hair(cls, context))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        hair = chosen_hair(context)
+        hair = target_hair(context)
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
@@ -141,7 +141,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:
-            return chosen_hair(context)[:1] or _raise_no_hair(
+            return target_hair(context)[:1] or _raise_no_hair(
                 "Nothing selected", "Select hair curves"
             )
         collection = bpy.data.collections.get(self.collection)

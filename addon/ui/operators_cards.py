@@ -18,7 +18,7 @@ from ..errors import HairloomError
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import report_outcome
-from .selection import chosen_hair, in_object_mode, needs_hair
+from .selection import in_object_mode, needs_hair, target_hair
 from .texts import translated
 
 #: number of levels of detail in a panel: the most that there may be
@@ -56,13 +56,13 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _can_make_cards(cls, context):
             return False
-        if not card_objects(chosen_hair(context)[0]):
+        if not card_objects(target_hair(context)[0]):
             cls.poll_message_set("There are no cards yet")
             return False
         return True
 
     def invoke(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         try:
             edits, _ = read_edits(hair, context.evaluated_depsgraph_get())
         except HairloomError:  # cards that cannot be read can still be discarded
@@ -94,7 +94,7 @@ def _build_steps(
     operator: bpy.types.Operator, context: bpy.types.Context, *, keep_edits: bool = True
 ) -> Steps[None]:
     """Make the cards of the active hair, and report it."""
-    hair = chosen_hair(context)[0]
+    hair = target_hair(context)[0]
     depsgraph, cached_rigs = context.evaluated_depsgraph_get(), tuple(previewed_rigs().values())
     job = CardObjectJob(
         hair, depsgraph, keep_edits=keep_edits, cached_rigs=cached_rigs, cache=previews.built_cards

@@ -14,7 +14,7 @@ from ..blender.properties.properties import settings_of
 from .drawing import draw_button
 from .help import WithHelp
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
-from .selection import active_mesh, chosen_hair, in_object_mode
+from .selection import active_mesh, in_object_mode, target_hair
 
 _MILLIMETRES = 1000.0
 
@@ -150,7 +150,7 @@ class HAIRLOOM_PT_collider(WithHelp, bpy.types.Panel):
 def _mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active mesh, or the one that the chosen hair grows on."""
     mesh = active_mesh(context)
-    hair = chosen_hair(context)
+    hair = target_hair(context)
     return mesh if mesh is not None or not hair else head_of(hair[0])
 
 

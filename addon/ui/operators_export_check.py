@@ -17,7 +17,7 @@ from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
 from .long_work import LongWork, Steps, steps_of_parts
 from .messages import draw_lines
 from .reports import report_outcome, wait_cursor
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 #: the check of the file browser or popup that is open
 _check: ExportCheck | None = None
@@ -128,7 +128,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         return cls.can_start() and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        check = ExportCheck.of(exportable_hair(chosen_hair(context)), previewed_rigs())
+        check = ExportCheck.of(exportable_hair(target_hair(context)), previewed_rigs())
         reading = check.read_steps(
             context.evaluated_depsgraph_get(), *_format_and_settings(self.engine)
         )

@@ -14,7 +14,7 @@ from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, nearest_surface, set_surface
 from ..errors import HairloomError
 from .reports import reporting, wait_cursor
-from .selection import chosen_hair, in_object_mode, needs_hair
+from .selection import in_object_mode, needs_hair, target_hair
 
 #: for Smart UV Project: the largest angle within an island [rad], the margin between islands
 _ANGLE_LIMIT, _ISLAND_MARGIN = 1.15, 0.02
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_set_surface(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair, depsgraph = chosen_hair(context)[0], context.evaluated_depsgraph_get()
+        hair, depsgraph = target_hair(context)[0], context.evaluated_depsgraph_get()
         selected = [obj for obj in context.selected_objects if obj.type == "MESH"]
         visible = [obj for obj in objects_in(context.view_layer) if obj.visible_get()]
         mesh = nearest_surface(hair, selected or visible, depsgraph)
@@ -60,7 +60,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         set_surface(hair, _surface_of(context))
         with wait_cursor(context), _only_selected(context, hair):
             bpy.ops.curves.snap_curves_to_surface(attach_mode="NEAREST")
@@ -91,7 +91,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair, head = chosen_hair(context)[0], _surface_of(context)
+        hair, head = target_hair(context)[0], _surface_of(context)
         with wait_cursor(context), _only_selected(context, head):
             bpy.ops.object.mode_set(mode="EDIT")
             try:
@@ -115,13 +115,13 @@ class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _can_fix(cls, context):
             return False
-        if any(map(render_problem, chosen_hair(context))):
+        if any(map(render_problem, target_hair(context))):
             return True
         cls.poll_message_set("Renders show it already, or a copy that shows its bake")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(render_problem, chosen_hair(context)):
+        for hair in filter(render_problem, target_hair(context)):
             remove_copy(hair)
         return {"FINISHED"}
 
@@ -137,7 +137,7 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not _is_shown(cls, context):
             return False
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         if hair.data.users > 1:
             cls.poll_message_set("Several objects share these curves: make them single first")
         elif not is_unevenly_scaled(hair):
@@ -148,7 +148,7 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         if hair.parent is not None and is_unevenly_scaled(hair.parent):
             raise HairloomError(
                 f"its parent, {hair.parent.name}, is scaled unevenly too",
@@ -181,7 +181,7 @@ def _only_selected(context: bpy.types.Context, obj: bpy.types.Object) -> Iterato
 def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
     if not (needs_hair(operator, context) and in_object_mode(operator, context)):
         return False
-    if is_shape_editable(chosen_hair(context)[0]):
+    if is_shape_editable(target_hair(context)[0]):
         return True
     operator.poll_message_set("It is linked from another file: make it local first")
     return False
@@ -191,20 +191,20 @@ def _is_shown(operator: type[Any], context: bpy.types.Context) -> bool:
     """Whether the hair can be selected, as Blender's own operators work on the selection."""
     if not _can_fix(operator, context):
         return False
-    if chosen_hair(context)[0].visible_get():
+    if target_hair(context)[0].visible_get():
         return True
     operator.poll_message_set("The hair is hidden: show it first")
     return False
 
 
 def _surface_of(context: bpy.types.Context) -> bpy.types.Object:
-    head = head_of(chosen_hair(context)[0])
+    head = head_of(target_hair(context)[0])
     assert head is not None, "poll has looked"
     return head
 
 
 def _needs_surface(operator: type[Any], context: bpy.types.Context) -> bool:
-    if head_of(chosen_hair(context)[0]) is not None:
+    if head_of(target_hair(context)[0]) is not None:
         return True
     operator.poll_message_set("The hair has no surface: press Set Surface first")
     return False

@@ -21,7 +21,7 @@ from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
 from .revert_shape import RevertShapeOperator
-from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .selection import in_object_mode, needs_hair, target_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
@@ -38,7 +38,7 @@ class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         check_settings_editable(hair)
         strokes = selected_or_new_lines(hair, "Stroke", context)
         add_to_collection(hair, COLLECTION_PROPERTY, COLLECTION_LABEL, strokes, context.scene)
@@ -66,7 +66,7 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         remove_from_collection(
-            chosen_hair(context)[0],
+            target_hair(context)[0],
             COLLECTION_PROPERTY,
             COLLECTION_LABEL,
             self.stroke,
@@ -89,14 +89,14 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if any(map(strokes_of, chosen_hair(context))):
+        if any(map(strokes_of, target_hair(context))):
             return True
         cls.poll_message_set("The selected hair has no strokes: press Add Stroke first")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
-        grooms = without_linked_duplicates(filter(strokes_of, chosen_hair(context)))
+        grooms = without_linked_duplicates(filter(strokes_of, target_hair(context)))
         jobs = (comb_flow(hair, depsgraph, settings) for hair in grooms)
         for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)

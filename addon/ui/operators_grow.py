@@ -10,11 +10,11 @@ from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .messages import draw_message
 from .selection import (
-    chosen_hair,
     growth_mesh,
     in_object_mode,
     make_active,
     needs_hair,
+    target_hair,
     without_linked_duplicates,
 )
 from .texts import translated
@@ -70,7 +70,7 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
         return cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        grooms = without_linked_duplicates(chosen_hair(context))
+        grooms = without_linked_duplicates(target_hair(context))
         yield from steps_of_parts(grow_again(grooms, context.evaluated_depsgraph_get()))
 
 

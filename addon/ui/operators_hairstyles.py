@@ -28,10 +28,10 @@ from .long_work import LongWork, Progress, Steps, steps_of_parts
 from .operators_start import start_preview_steps
 from .preferences import preferences
 from .selection import (
-    chosen_hair,
     growth_mesh,
     in_object_mode,
     make_active,
+    target_hair,
     without_linked_duplicates,
 )
 
@@ -189,14 +189,14 @@ class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context)):
             return False
-        if any(hair.hairloom.hairstyle for hair in chosen_hair(context)):
+        if any(hair.hairloom.hairstyle for hair in target_hair(context)):
             return True
         cls.poll_message_set("Select hair that was added as a hairstyle")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         grooms = without_linked_duplicates(
-            hair for hair in chosen_hair(context) if hair.hairloom.hairstyle
+            hair for hair in target_hair(context) if hair.hairloom.hairstyle
         )
         fitting = fit_again(grooms, context.evaluated_depsgraph_get())
         for warning in (yield from steps_of_parts(fitting)):

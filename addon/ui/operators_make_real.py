@@ -7,7 +7,7 @@ import bpy
 from ..blender.strands.make_real import make_real
 from .long_work import LongWork, Steps, steps_of_parts
 from .reports import report_outcome
-from .selection import chosen_hair, in_object_mode, make_active, needs_hair
+from .selection import in_object_mode, make_active, needs_hair, target_hair
 
 
 class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
@@ -24,7 +24,7 @@ class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
         return cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())
+        parts = make_real(target_hair(context), context.evaluated_depsgraph_get())
         results = yield from steps_of_parts(parts)
         for each in results:
             report_outcome(self, each.outcome)

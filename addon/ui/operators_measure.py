@@ -12,7 +12,7 @@ from ..blender.sessions.measures import card_table_of, table_of
 from ..blender.sessions.session import Session
 from .drawing import draw_button
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 from .texts import translated
 
 #: Fraction of a table's width for the names.
@@ -30,14 +30,14 @@ class HAIRLOOM_OT_measure(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(_simulated(chosen_hair(context))):
+        if any(_simulated(target_hair(context))):
             return True
         cls.poll_message_set("The selected hair is not simulated: press Play first")
         return False
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for session in _simulated(chosen_hair(context)):
+        for session in _simulated(target_hair(context)):
             session.measure()
         redraw_panels()
         return {"FINISHED"}

@@ -12,7 +12,7 @@ from ..groom.mirror_settings import MirrorSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .reports import report_outcome
-from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .selection import in_object_mode, needs_hair, target_hair, without_linked_duplicates
 from .texts import translated
 
 
@@ -34,7 +34,7 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
         settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
         jobs = (
             mirror_hair(hair, depsgraph, settings)
-            for hair in without_linked_duplicates(chosen_hair(context))
+            for hair in without_linked_duplicates(target_hair(context))
         )
         for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)

@@ -18,7 +18,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
-from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .selection import in_object_mode, needs_hair, target_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_add_parting(bpy.types.Operator):
@@ -35,7 +35,7 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         check_settings_editable(hair)
         lines = selected_or_new_lines(hair, "Parting", context)
         partings.add_partings(hair, lines, context.scene)
@@ -61,7 +61,7 @@ class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        partings.remove_parting(chosen_hair(context)[0], self.line, context)
+        partings.remove_parting(target_hair(context)[0], self.line, context)
         return {"FINISHED"}
 
 
@@ -78,14 +78,14 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if any(map(partings.partings_of, chosen_hair(context))):
+        if any(map(partings.partings_of, target_hair(context))):
             return True
         cls.poll_message_set("The selected hair has no partings: press Add Parting first")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
-        grooms = without_linked_duplicates(filter(partings.partings_of, chosen_hair(context)))
+        grooms = without_linked_duplicates(filter(partings.partings_of, target_hair(context)))
         jobs = (comb_parting(hair, depsgraph, settings) for hair in grooms)
         for outcome in (yield from steps_of_parts(batched(jobs))):
             report_outcome(self, outcome)

@@ -30,7 +30,7 @@ from ..blender.scene.principled import has_principled_hair, look_from_material
 from .file_paths import FILE_TO_READ
 from .preset_chooser import KIND
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 #: suffix of preset files
 _SUFFIX = ".json"
@@ -63,9 +63,9 @@ def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
     Raises:
         HairloomError: some hair is linked from another file. Nothing is changed then.
     """
-    for hair in chosen_hair(context):
+    for hair in target_hair(context):
         check_editable(hair)
-    for hair in chosen_hair(context):
+    for hair in target_hair(context):
         for settings in all_settings:
             apply(settings, hair)
         if has_look_material(hair.data):
@@ -111,7 +111,7 @@ class HAIRLOOM_FH_preset(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
-        return poll_file_object_drop(context) and bool(chosen_hair(context))
+        return poll_file_object_drop(context) and bool(target_hair(context))
 
 
 class HAIRLOOM_OT_save_preset(bpy.types.Operator):
@@ -132,12 +132,12 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
         return needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        self.title = free_title(chosen_hair(context)[0].name, self.section)
+        self.title = free_title(target_hair(context)[0].name, self.section)
         return context.window_manager.invoke_props_dialog(self)
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = save_own(self.title, *settings_to_store(chosen_hair(context)[0], self.section))
+        path = save_own(self.title, *settings_to_store(target_hair(context)[0], self.section))
         report(self, "INFO", f"Saved as {OWN_PREFIX}{path.stem}, in {path}")
         return {"FINISHED"}
 
@@ -175,7 +175,7 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(has_principled_hair(hair) for hair in chosen_hair(context)):
+        if any(has_principled_hair(hair) for hair in target_hair(context)):
             return True
         cls.poll_message_set("The hair has no material with a Principled Hair BSDF")
         return False
@@ -183,7 +183,7 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         depsgraph = context.evaluated_depsgraph_get()
-        grooms = list(filter(has_principled_hair, chosen_hair(context)))
+        grooms = list(filter(has_principled_hair, target_hair(context)))
         for hair in grooms:
             check_editable(hair)
         for hair in grooms:
@@ -210,9 +210,9 @@ class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in chosen_hair(context):
+        for hair in target_hair(context):
             check_editable(hair)
-        for hair in chosen_hair(context):
+        for hair in target_hair(context):
             material, notes = apply_look(hair)
             report(self, "INFO", f"{hair.name} has the material '{material.name}'")
             for note in notes:

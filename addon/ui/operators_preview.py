@@ -24,7 +24,7 @@ from ..blender.scene.source import hair_dynamics_modifiers, mute_hair_dynamics
 from ..blender.sessions.fins import any_enabled
 from .long_work import running_label
 from .reports import report_outcome, reporting, wait_cursor
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 #: Rate of ticks [1/s]; high, so that a frame is delayed only by a fraction of its length.
 TICKS_PER_SECOND = 120.0
@@ -48,7 +48,7 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)
+        hair = target_hair(context)
         if all(previews.session_of(each) for each in hair):
             stop_preview(hair)
             return {"FINISHED"}
@@ -69,14 +69,14 @@ class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(map(_is_building, chosen_hair(context))):
+        if any(map(_is_building, target_hair(context))):
             return True
         cls.poll_message_set("Nothing is being made for the selected hair")
         return False
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(_is_building, chosen_hair(context)):
+        for hair in filter(_is_building, target_hair(context)):
             session = previews.session_of(hair)
             if session is None or not session.is_made:
                 stop_preview([hair])
@@ -118,7 +118,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             return {"FINISHED"}
         with wait_cursor(context):
             if not previews.simulations_in(context.evaluated_depsgraph_get()):
-                start_preview(self, context, chosen_hair(context))
+                start_preview(self, context, target_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
             for warning in (*fin_warnings, *previews.play(depsgraph, blocking=False)):
@@ -178,13 +178,13 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not needs_hair(cls, context):
             return False
-        if any(hair_dynamics_modifiers(hair) for hair in chosen_hair(context)):
+        if any(hair_dynamics_modifiers(hair) for hair in target_hair(context)):
             return True
         cls.poll_message_set("No modifier with Hair Dynamics simulates the selected hair")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        count = sum(mute_hair_dynamics(hair) for hair in chosen_hair(context))
+        count = sum(mute_hair_dynamics(hair) for hair in target_hair(context))
         modifiers = "1 modifier" if count == 1 else f"{count} modifiers"
         report(self, "INFO", f"Muted {modifiers} of Hair Dynamics")
         return {"FINISHED"}

@@ -7,7 +7,7 @@ import bpy
 from ..blender.base.outcome import report
 from ..blender.preview import previews
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 from .state import draw_problems, problems_of
 from .texts import translated
 
@@ -32,13 +32,13 @@ class HAIRLOOM_OT_show_problems(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         """For scripts: report all problems."""
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         for problem in problems_of(hair, previews.session_of(hair)):
             report(self, "WARNING", problem.text)
         return {"FINISHED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         title = translated("{name}: problems", name=hair.name)
         self.layout.label(text=title, translate=False)
         draw_problems(self.layout, context, hair, previews.session_of(hair), _WIDTH)

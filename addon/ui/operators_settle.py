@@ -13,7 +13,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
 from .reports import report_outcome
 from .revert_shape import RevertShapeOperator
-from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .selection import in_object_mode, needs_hair, target_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, SettleSettings), context.evaluated_depsgraph_get()
         writes = []
-        for hair in without_linked_duplicates(chosen_hair(context)):
+        for hair in without_linked_duplicates(target_hair(context)):
             yield Progress("Reading the hair")
             writes.append((yield from as_progress(settle_hair(hair, depsgraph, settings))))
         for write in writes:

@@ -24,7 +24,7 @@ from ..errors import HairloomError
 from .file_paths import FILE_TO_WRITE, FOLDER_OF_PICTURES
 from .long_work import LongWork, Steps, counted, draw_progress
 from .reports import reporting, wait_cursor
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 _SAMPLES = IntProperty(
     name="Samples", description="Subpixels along each side of a pixel", default=3, min=1, max=4
@@ -112,7 +112,7 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
             video=self.video,
             frame_rate=frame_rate(context.scene),
         )
-        name = file_name(chosen_hair(context)[0].name)
+        name = file_name(target_hair(context)[0].name)
         folder = Path(absolute_path(self.directory))
         return Turntable(
             shown.studio, shown.pose, shown.points, settings, folder, name, shown.guides
@@ -181,7 +181,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
 
 def _shown(operator: bpy.types.Operator, context: bpy.types.Context) -> ShownGroom:
     """The active hair in its present state; reports its warnings first."""
-    hair = chosen_hair(context)[0]
+    hair = target_hair(context)[0]
     shown = shown_groom(hair, context.evaluated_depsgraph_get())
     for note in shown.notes:
         report(operator, "WARNING", f"{hair.name}: {note}")

@@ -11,7 +11,7 @@ from ..blender.pictures.slices import filled_image, slices_of_view
 from ..blender.preview import previews
 from ..blender.sessions.session import Session
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 
 class HAIRLOOM_OT_show_slices(bpy.types.Operator):
@@ -61,14 +61,14 @@ def _needs_preview(operator: type[bpy.types.Operator], context: bpy.types.Contex
     """For `poll`: whether hair is previewed; if not, the greyed-out button says so."""
     if not needs_hair(operator, context):
         return False
-    if previews.session_of(chosen_hair(context)[0]) is None:
+    if previews.session_of(target_hair(context)[0]) is None:
         operator.poll_message_set("Press Preview first")
         return False
     return True
 
 
 def _previewed(context: bpy.types.Context) -> Session:
-    session = previews.session_of(chosen_hair(context)[0])
+    session = previews.session_of(target_hair(context)[0])
     assert session is not None, "poll"
     session.finish(context.evaluated_depsgraph_get())
     return session

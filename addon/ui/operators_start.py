@@ -25,11 +25,11 @@ from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import report_outcome, reporting
 from .selection import (
     active_mesh,
-    chosen_hair,
     growth_mesh,
     in_object_mode,
     make_active,
     needs_hair,
+    target_hair,
 )
 
 _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
@@ -135,7 +135,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not (cls.can_start() and in_object_mode(cls, context)):
             return False
-        if any(previews.session_of(hair) is None for hair in chosen_hair(context)):
+        if any(previews.session_of(hair) is None for hair in target_hair(context)):
             return True
         cls.poll_message_set("Select hair curves that Hairloom does not preview yet")
         return False
@@ -143,7 +143,7 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         chosen = preferences(context)
         prepared, problems = list[bpy.types.Object](), list[HairloomError]()
-        grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
+        grooms, depsgraph = target_hair(context), context.evaluated_depsgraph_get()
         jobs = (prepare_existing_hair(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
         for hair, notes in (yield from steps_of_parts(batched(jobs, problems.append))):
             for note in notes:
@@ -205,7 +205,7 @@ class HAIRLOOM_OT_show_settings(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        make_active(context, chosen_hair(context)[:1])
+        make_active(context, target_hair(context)[:1])
         for area in () if context.screen is None else context.screen.areas:
             if area.type == "PROPERTIES":
                 _show_data(area.spaces.active)

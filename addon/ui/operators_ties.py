@@ -11,7 +11,7 @@ from ..blender.colliders import ties
 from .drawing import draw_section
 from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 
 class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
@@ -28,7 +28,7 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        hair = chosen_hair(context)[0]
+        hair = target_hair(context)[0]
         check_settings_editable(hair)
         rings = [obj for obj in context.selected_objects if _can_be_tie(obj, hair)]
         if not rings:
@@ -62,7 +62,7 @@ class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        ties.remove_tie(chosen_hair(context)[0], self.tie, context)
+        ties.remove_tie(target_hair(context)[0], self.tie, context)
         return {"FINISHED"}
 
 

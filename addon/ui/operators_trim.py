@@ -22,7 +22,7 @@ from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .object_lists import REMOVED_OBJECT, draw_objects
 from .reports import report_outcome, reporting
 from .revert_shape import RevertShapeOperator
-from .selection import chosen_hair, in_object_mode, needs_hair, without_linked_duplicates
+from .selection import in_object_mode, needs_hair, target_hair, without_linked_duplicates
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
@@ -41,14 +41,14 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
             return False
         if any(
             trim_shapes_of(hair) or _selected_trim_shapes(hair, context)
-            for hair in chosen_hair(context)
+            for hair in target_hair(context)
         ):
             return True
         cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty together with the hair")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        depsgraph, chosen = context.evaluated_depsgraph_get(), chosen_hair(context)
+        depsgraph, chosen = context.evaluated_depsgraph_get(), target_hair(context)
         selected = {hair: _selected_trim_shapes(hair, context) for hair in chosen}
         for hair, shapes in selected.items():
             for obj in shapes:
@@ -84,7 +84,7 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         remove_from_collection(
-            chosen_hair(context)[0],
+            target_hair(context)[0],
             COLLECTION_PROPERTY,
             COLLECTION_LABEL,
             self.shape,

@@ -25,13 +25,13 @@ from .operators_start import (
     HAIRLOOM_OT_use_groom,
 )
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
-from .selection import active_mesh, chosen_hair, pinned_hair
+from .selection import active_mesh, pinned_hair, target_hair
 from .state import NAME_FRACTION, draw_notice, draw_problems_row, draw_state
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
     """The hair that the panels show."""
-    hair = chosen_hair(context)
+    hair = target_hair(context)
     return hair[0] if hair else None
 
 

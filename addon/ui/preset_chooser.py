@@ -13,7 +13,7 @@ from ..blender.properties.properties import TRANSLATION_CONTEXT
 from ..blender.scene.curves import COLOR_ATTRIBUTE
 from ..blender.scene.principled import has_principled_hair
 from .messages import draw_message
-from .selection import chosen_hair
+from .selection import target_hair
 
 #: section -> name of its presets, and a description
 KINDS: dict[str, tuple[str, str]] = {
@@ -110,7 +110,7 @@ def _preset_property(section: str) -> Any:
         return enum_items
 
     def get(_presets: Any) -> int:
-        hair = chosen_hair(bpy.context)
+        hair = target_hair(bpy.context)
         return _preset_number(hair[0], _entries(section)[0]) if hair else 0
 
     def apply(_presets: Any, number: int) -> None:

@@ -9,7 +9,7 @@ import bpy
 from ..blender.base.outcome import report
 from ..blender.scene.shape_backup import ShapeBackup
 from .reports import reporting
-from .selection import chosen_hair, in_object_mode, needs_hair
+from .selection import in_object_mode, needs_hair, target_hair
 
 
 class RevertShapeOperator:
@@ -27,14 +27,14 @@ class RevertShapeOperator:
     def poll(cls: Any, context: bpy.types.Context) -> bool:
         if not (in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
-        if any(map(cls.backup.exists, chosen_hair(context))):
+        if any(map(cls.backup.exists, target_hair(context))):
             return True
         cls.poll_message_set(cls.disabled_text)
         return False
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
-        for hair in filter(self.backup.exists, chosen_hair(context)):
+        for hair in filter(self.backup.exists, target_hair(context)):
             if self.backup.restore(hair):
                 text = (
                     "changes that other tools and brushes have made to its shape since then are "

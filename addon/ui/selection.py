@@ -12,7 +12,7 @@ from ..blender.preview import previews
 from ..errors import HairloomError
 
 
-def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
+def target_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The hair that buttons and panels apply to, the active first.
 
     In a pinned Properties editor this is the hair that it shows. Otherwise these are the selected
@@ -97,7 +97,7 @@ def in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
 
 def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether hair curves are selected; the greyed-out button says so."""
-    if chosen_hair(context):
+    if target_hair(context):
         return True
     operator.poll_message_set("Select hair curves first (Add > Curve > Empty Hair, or import some)")
     return False

@@ -29,7 +29,7 @@ from .file_paths import FILE_TO_WRITE
 from .long_work import LongWork, Progress, Steps
 from .operators_export_check import exportable_hair
 from .reports import report_outcome
-from .selection import chosen_hair, needs_hair
+from .selection import needs_hair, target_hair
 
 _MULTIPLE_OBJECTS = (
     ("one", "One File", "All hair in one file, with separate groups for each object"),
@@ -100,7 +100,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         return bool(bpy.data.hair_curves) or needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        hair = exportable_hair(chosen_hair(context))
+        hair = exportable_hair(target_hair(context))
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
@@ -167,7 +167,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     def _hair(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if not self.collection:
-            return exportable_hair(chosen_hair(context)) or _raise_no_hair(
+            return exportable_hair(target_hair(context)) or _raise_no_hair(
                 "Nothing selected", "Select hair curves"
             )
         scene_collection = context.scene.collection

@@ -15,7 +15,7 @@ from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.ui import menus
 from hairloom.addon.ui.panels import HAIRLOOM_PT_data
-from hairloom.addon.ui.selection import chosen_hair
+from hairloom.addon.ui.selection import target_hair
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def hair(new_hair, sphere):
 def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
     layer = bpy.context.view_layer
     assert objects_in(layer) == [sphere, hair]
-    assert chosen_hair(bpy.context) == [hair]
+    assert target_hair(bpy.context) == [hair]
     assert fins_in(layer) == []
     assert hair_on(sphere, layer) == [hair]
 
@@ -63,10 +63,10 @@ def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):
     bpy.context.collection.objects.link(combed)
     hair.hide_render = hair.hide_viewport = True
     bpy.context.view_layer.update()
-    assert chosen_hair(bpy.context) == [combed]
+    assert target_hair(bpy.context) == [combed]
     combed.hide_render = combed.hide_viewport = True
     bpy.context.view_layer.update()
-    assert set(chosen_hair(bpy.context)) == {hair, combed}
+    assert set(target_hair(bpy.context)) == {hair, combed}
 
 
 def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_hair):
@@ -76,17 +76,17 @@ def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_ha
     area = next(each for each in next(screens).areas if each.type == "PROPERTIES")
     space = area.spaces.active
     with bpy.context.temp_override(area=area):
-        assert chosen_hair(bpy.context)[0] == other
+        assert target_hair(bpy.context)[0] == other
         for pinned in (hair, hair.data):
             space.pin_id = None  # Blender accepts only an ID of the kind that is pinned
             space.pin_id, space.use_pin_id = pinned, True
-            assert chosen_hair(bpy.context) == [hair]
+            assert target_hair(bpy.context) == [hair]
             assert HAIRLOOM_PT_data.poll(bpy.context)
         space.use_pin_id = False
-        assert chosen_hair(bpy.context)[0] == other
+        assert target_hair(bpy.context)[0] == other
         space.pin_id = None
         space.pin_id, space.use_pin_id = hair.data.surface, True
-        assert chosen_hair(bpy.context)[0] == other
+        assert target_hair(bpy.context)[0] == other
         space.pin_id, space.use_pin_id = None, False
 
 
@@ -94,7 +94,7 @@ def test_hair_of_another_view_layer_is_reported_instead_of_selected(hair, sphere
     """Such as hair that is previewed in a scene that is not shown."""
     bpy.ops.hairloom.preview()
     bpy.context.window.scene = bpy.data.scenes.new("Other")
-    assert chosen_hair(bpy.context) == [hair]
+    assert target_hair(bpy.context) == [hair]
     with pytest.raises(RuntimeError, match="Hair: it is not in this view layer"):
         bpy.ops.hairloom.show_settings()
 

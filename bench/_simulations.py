@@ -15,7 +15,7 @@ from hairloom.addon.render.dynamics_pass import DynamicsPass
 from hairloom.addon.render.textures import texture_to_array
 
 
-class Form(Protocol):
+class Simulation(Protocol):
     """A simulation in progress."""
 
     def advance(self, drive: Drive, settings: DynamicsSettings, duration: float) -> None:
@@ -28,7 +28,7 @@ class Form(Protocol):
         """Free its GPU resources."""
 
 
-class NumpyForm:
+class NumpySimulation:
     def __init__(self, state: DynamicsState) -> None:
         self._state = state
 
@@ -42,7 +42,7 @@ class NumpyForm:
         """Nothing to free."""
 
 
-class ComputeForm:
+class ComputeSimulation:
     def __init__(self, state: DynamicsState) -> None:
         self._pass = DynamicsPass(state)
 
@@ -58,7 +58,7 @@ class ComputeForm:
 
 
 def play(
-    form: Form,
+    simulation: Simulation,
     drives: Iterable[Drive],
     settings: DynamicsSettings,
     fps: float,
@@ -68,10 +68,10 @@ def play(
     times = []
     for drive in drives:
         begin = time.perf_counter()
-        form.advance(drive, settings, 1.0 / fps)
+        simulation.advance(drive, settings, 1.0 / fps)
         times.append((time.perf_counter() - begin) * 1000.0)
         if watch is not None:
-            watch(form.state(), drive)
+            watch(simulation.state(), drive)
     return times
 
 
