@@ -19,7 +19,12 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.affine import transform_points
 from ..base.attributes import read_attribute
-from ..base.mesh_arrays import triangle_corners, triangle_indices
+from ..base.mesh_arrays import (
+    corner_vertices,
+    triangle_corners,
+    triangle_indices,
+    vertex_positions,
+)
 from ..base.objects import as_mesh
 
 #: the UV map of cards that holds occlusion and along
@@ -68,7 +73,7 @@ def read_surface(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
             )
         # faster than the vertices of loop triangles, which are not stored as an array
-        triangles = read_attribute(mesh, ".corner_vert", "CORNER")[loops]
+        triangles = corner_vertices(mesh)[loops]
         corner_uv = read_corner_uv(mesh, loops)
         if corner_uv is None and need_uv:
             raise HairloomError(
@@ -76,7 +81,7 @@ def read_surface(
                 place=place,
                 remedy="Unwrap it (Edit Mode, UV > Unwrap), or omit --strict",
             )
-        surface = Surface(_positions(mesh), triangles, corner_uv)
+        surface = Surface(vertex_positions(mesh), triangles, corner_uv)
     return _cache.shared(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
 
 
@@ -96,7 +101,7 @@ def read_rest_surfaces(
     found = [rest]
     if is_deformed_only:
         found = [
-            _positions(original) if rest is None else rest,
+            vertex_positions(original) if rest is None else rest,
             _shape_key_positions(original, depsgraph),
         ]
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
@@ -154,7 +159,7 @@ def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, pla
         HairloomError: not a mesh.
     """
     with evaluated_mesh(obj, depsgraph, place) as mesh:
-        positions = _positions(mesh)
+        positions = vertex_positions(mesh)
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world, np.float32)
     return positions @ matrix[:3, :3].T + matrix[:3, 3]
 
@@ -187,14 +192,6 @@ def evaluated_mesh(
     with as_mesh(obj, depsgraph) as mesh:
         assert mesh is not None
         yield mesh
-
-
-def _positions(mesh: bpy.types.Mesh) -> Floats:
-    """(vertex_count, 3) float32, object space."""
-    if not mesh.vertices:  # Blender then stores no attribute
-        return np.zeros((0, 3), np.float32)
-    positions: Floats = read_attribute(mesh, "position", "POINT", 3)
-    return positions
 
 
 def read_corner_uv(mesh: bpy.types.Mesh, loops: Ints) -> Floats | None:
