@@ -2,8 +2,8 @@
 
     repeat substep_rate times a second:
         hair grid    at some substeps: forces between hair and other hair
-        brake        quadratic drag
-        blow         the scene's force fields push, slow down and turn
+        drag         quadratic, through air or water
+        fields       the scene's force fields push, slow down and turn
         predict      Verlet: inertia, damping, gravity, wind
         pin          the head carries the first two CVs, ties carry the CVs they hold
         springs      curls stretch; the rest of the substep keeps the resulting lengths
