@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from ..strands.vectors import perpendicular_axes, triple
 
 #: steps of a sequence that fills a square evenly, used by no other sequence of a picture
 _STEPS = np.sqrt([2.0, 3.0]) - 1.0
+#: step of the turn of shadow maps, in quarter turns: the golden ratio fills the circle evenly
+_ROLL_STEP = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 def lights_at(lights: Sequence[Light], sample: int, center: Floats) -> tuple[Light, ...]:
@@ -30,10 +33,17 @@ def lights_at(lights: Sequence[Light], sample: int, center: Floats) -> tuple[Lig
         center: (3,) [m] the point that a lamp's disk faces.
     """
     place = (0.5 + sample * _STEPS) % 1.0
-    return tuple(_light_sample(light, place, np.asarray(center, np.float64)) for light in lights)
+    roll = float(0.5 * pi * (sample * _ROLL_STEP % 1.0))
+    return tuple(_light_sample(light, place, roll, np.asarray(center, float)) for light in lights)
 
 
-def _light_sample(light: Light, place: Floats, center: Floats) -> Light:
+def _light_sample(light: Light, place: Floats, roll: float, center: Floats) -> Light:
+    """A point of a light, whose shadow maps are turned; a light without a size stays as it is."""
+    at = _point_of(light, place, center)
+    return light if at is light else replace(at, map_roll=roll)
+
+
+def _point_of(light: Light, place: Floats, center: Floats) -> Light:
     if light.kind == "sun":
         return light if light.angle <= 0.0 else _sun_sample(light, disk_place(place))
     if light.panel is not None:

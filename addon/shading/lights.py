@@ -83,6 +83,8 @@ class Light:
     name: as the artist sees it.
     is_from_world: it is a bright lobe of the world, and shines only where the world's light is
     used.
+    map_roll: turn of its shadow maps about its rays [rad]. Samples of a soft light differ in it, so
+    that edges of texels do not show in their mean.
     """
 
     kind: Literal["sun", "point", "spot", "area"]
@@ -96,6 +98,7 @@ class Light:
     name: str = field(default="", compare=False)
     is_from_world: bool = False
     angle: float = 0.0
+    map_roll: float = 0.0
 
     @classmethod
     def sun(

@@ -92,6 +92,40 @@ def test_a_card_behind_cards_has_the_light_that_they_leave(
     assert found[2:12] == pytest.approx(alone[2:12], rel=0.02)
 
 
+@pytest.mark.parametrize("low", [0.3, 0.505, 0.51])
+def test_a_card_thinner_than_a_texel_takes_its_part_of_soft_light(frame: Any, low: float) -> None:
+    """Against the light on its own area: without turned maps it would hit a row of texels, or
+    none."""
+    from hairloom.addon.render.card_pass import CardPass
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    width, alpha, samples = 0.01, 0.3, 6
+    back = card(1.0, 0.0, 0.6, (1.0, 1.0))
+    back["normal"] = -back["normal"]
+    sun = dataclasses.replace(SUN, angle=1e-4)
+    textures = textures_of([alpha, 1.0])
+    found, alone = (
+        frame.render_still(
+            snapshot_of(
+                mesh_of(*cards),
+                textures,
+                volume=of_form("slices"),
+                lights=(sun,),
+                ambient=(0.0, 0.0, 0.0),
+                shading=PLAIN,
+            ),
+            behind(frame),
+            *(SIZE, SIZE, samples),
+            center=np.full(3, 0.5),
+            passes=(MeshPass(), StrandPass()),
+            card_pass=CardPass(),
+        )[8:24, :, 0]
+        for cards in ((card(low, low + width, 0.0, (0.0, 0.0)), back), (back,))
+    )
+    assert 1.0 - found.sum() / alone.sum() == pytest.approx(alpha * width, rel=0.25)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
     """tau is scaled by the thickness, of cards in front and of the card itself."""

@@ -144,7 +144,7 @@ def quantized_ball(center: Floats, radius: float) -> Ball:
 def light_frame(light: Light, ball: Ball) -> LightFrame | None:
     """The frame of a light's map; None where a light within the ball can have none."""
     if light.kind == "sun":
-        return sun_frame(np.asarray(light.vector, np.float64), ball)
+        return sun_frame(np.asarray(light.vector, np.float64), ball, light.map_roll)
     eye = np.asarray(light.vector, np.float64)
     away = eye - ball.center
     distance = float(np.linalg.norm(away))
@@ -152,7 +152,7 @@ def light_frame(light: Light, ball: Ball) -> LightFrame | None:
         # the cone that touches the ball
         tangent = ball.radius / np.sqrt(distance**2 - ball.radius**2)
         ends = distance - ball.radius, distance + ball.radius
-        return perspective_frame(away / distance, eye, float(tangent), ends)
+        return perspective_frame(away / distance, eye, float(tangent), ends, light.map_roll)
     axis = shines_along(light)
     if axis is None:
         if distance < _MAX_CENTER_DISTANCE * ball.radius:
@@ -162,7 +162,8 @@ def light_frame(light: Light, ball: Ball) -> LightFrame | None:
     if ahead + ball.radius < _MIN_AHEAD * ball.radius:
         return None
     near = max(ahead - ball.radius, 0.0)
-    return perspective_frame(-axis, eye, float(np.tan(MAX_HALF_ANGLE)), (near, ahead + ball.radius))
+    ends = near, ahead + ball.radius
+    return perspective_frame(-axis, eye, float(np.tan(MAX_HALF_ANGLE)), ends, light.map_roll)
 
 
 def is_too_near(light: Light, ball: Ball) -> bool:
@@ -185,9 +186,9 @@ def shines_along(light: Light) -> Floats | None:
     return along if along.any() else None
 
 
-def sun_frame(towards: Floats, ball: Ball) -> LightFrame:
-    """The frame of a sun, towards which `towards` (3,) points."""
-    right, up, towards = _axes(towards)
+def sun_frame(towards: Floats, ball: Ball, roll: float = 0.0) -> LightFrame:
+    """The frame of a sun, towards which `towards` (3,) points. roll: see Light.map_roll."""
+    right, up, towards = _axes(towards, roll)
     to_map = np.eye(4)
     to_map[:2, :3] = right / ball.radius, up / ball.radius
     to_map[:2, 3] = -to_map[:2, :3] @ ball.center
@@ -197,15 +198,16 @@ def sun_frame(towards: Floats, ball: Ball) -> LightFrame:
 
 
 def perspective_frame(
-    towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]
+    towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float], roll: float = 0.0
 ) -> LightFrame:
     """The frame of a light at the place `eye` that looks against `towards`, each (3,).
 
     Args:
         tangent: of half the angle of view.
         ends: distances from the light at which depth is 0 and 1 [m].
+        roll: see Light.map_roll.
     """
-    right, up, towards = _axes(towards)
+    right, up, towards = _axes(towards, roll)
     near, far = ends
     to_map = np.zeros((4, 4))
     to_map[:2, :3] = right / tangent, up / tangent
@@ -216,10 +218,16 @@ def perspective_frame(
     return LightFrame(to_map, to_map[2].copy(), far - near)
 
 
-def _axes(towards: Floats) -> tuple[Floats, Floats, Floats]:
-    """Right, up and the direction itself; they turn smoothly with it but near +Z and -Z."""
+def _axes(towards: Floats, roll: float) -> tuple[Floats, Floats, Floats]:
+    """Right, up and the direction itself; they turn smoothly with it but near +Z and -Z.
+
+    Args:
+        roll: turn of right and up about the direction [rad].
+    """
     towards = towards / np.linalg.norm(towards)
     pole = np.array([0.0, 1.0, 0.0]) if abs(towards[2]) > 0.999 else np.array([0.0, 0.0, 1.0])
     right = np.cross(pole, towards)
     right /= np.linalg.norm(right)
-    return right, np.cross(towards, right), towards
+    up = np.cross(towards, right)
+    cosine, sine = np.cos(roll), np.sin(roll)
+    return cosine * right + sine * up, cosine * up - sine * right, towards

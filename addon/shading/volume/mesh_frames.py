@@ -88,7 +88,7 @@ def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
     if not light.casts_shadow:
         return ()
     if light.kind == "sun":
-        return (sun_frame(np.asarray(light.vector, np.float64), ball),)
+        return (sun_frame(np.asarray(light.vector, np.float64), ball, light.map_roll),)
     eye = np.asarray(light.vector, np.float64)
     away = eye - ball.center
     distance = float(np.linalg.norm(away))
@@ -97,9 +97,9 @@ def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
     is_around = distance * np.sin(_WIDEST) <= ball.radius
     reach = np.inf if is_around else ball.radius / np.sqrt(distance**2 - ball.radius**2)
     if axis is not None and tangent < min(reach, float(np.tan(_WIDEST))):
-        return (perspective_frame(-axis, eye, tangent, (0.0, ends[1])),)
+        return (perspective_frame(-axis, eye, tangent, (0.0, ends[1]), light.map_roll),)
     if not is_around:
-        return (perspective_frame(away / distance, eye, float(reach), ends),)
+        return (perspective_frame(away / distance, eye, float(reach), ends, light.map_roll),)
     sides = _sides(axis)
     return tuple(
         perspective_frame(-side, eye, _SIDE, (0.0, ends[1]))

@@ -54,6 +54,21 @@ def test_the_first_sample_is_the_middle() -> None:
         assert first.vector == pytest.approx(light.vector), name
 
 
+@pytest.mark.parametrize("name", LIGHTS)
+def test_each_sample_turns_the_shadow_map_by_another_angle(name: str) -> None:
+    """Over a quarter turn, after which a square map is the same, and evenly: no gap of the first 16
+    is wider than twice their mean. The first one is not turned."""
+    rolls = [lights_at((LIGHTS[name],), sample, np.zeros(3))[0].map_roll for sample in range(16)]
+    assert rolls[0] == 0.0
+    gaps = np.diff([*np.sort(rolls), 0.5 * np.pi])
+    assert gaps.min() > 0.0 and gaps.max() < 2.0 * 0.5 * np.pi / 16
+
+
+def test_the_map_of_a_light_without_a_size_stays_as_it_is() -> None:
+    hard = Light.sun((0.3, 0.2, -1.0), WHITE, 3.0)
+    assert lights_at((hard,), 5, np.zeros(3)) == (hard,)
+
+
 @pytest.mark.parametrize("name", ["lamp", "ball", "spot"])
 def test_every_point_of_a_lamp_gives_the_hair_as_much(name: str) -> None:
     light, hair = LIGHTS[name], np.zeros((1, 3))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ LIGHTS = {
     "near point": Light.point((0.2, 0.1, 0.15), (1, 1, 1), 3.0),
     "far point": Light.point((20.0, -30.0, 10.0), (1, 1, 1), 3.0),
 }
+LIGHTS |= {f"turned {name}": replace(light, map_roll=0.6) for name, light in LIGHTS.items()}
 BALL = Ball(np.array([0.01, -0.02, 0.03]), 0.15)
 
 
@@ -45,6 +48,19 @@ def test_all_points_of_a_ray_share_a_place_and_get_deeper(light: Light) -> None:
     place, depth = frame.places(start[:, None] - away[:, None] * ray)
     assert np.abs(place - place[:, :1]).max() < 1e-9
     assert (np.diff(depth, axis=1) > 0.0).all()
+
+
+@pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
+def test_a_turned_map_is_the_same_map_about_the_middle_of_the_ball(light: Light) -> None:
+    """Against a rotation of the places by the difference of two turns."""
+    frames = [light_frame(replace(light, map_roll=roll), BALL) for roll in (0.2, 0.9)]
+    (first, depth), (second, same_depth) = (
+        frame.places(on_the_ball(50)) for frame in frames if frame is not None
+    )
+    cosine, sine = np.cos(0.7), np.sin(0.7)
+    turned = (first - 0.5) @ np.array([[cosine, -sine], [sine, cosine]])
+    assert second - 0.5 == pytest.approx(turned, abs=1e-9)
+    assert same_depth == pytest.approx(depth, abs=1e-12)
 
 
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
