@@ -19,7 +19,7 @@ type Bools = NDArray[np.bool_]
 
 
 def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
-    """Whether two arrays are equal, with NaN in the same places, or both missing."""
+    """Whether two arrays of any shape are equal, with NaN in the same places, or both missing."""
     if one is None or other is None:
         return one is other
     return np.array_equal(one, other, equal_nan=True)

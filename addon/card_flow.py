@@ -112,8 +112,11 @@ def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
 
 
 def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:
-    """Cards riding on guides, led out of the solids of the pose, world space; arguments as of
-    `strands_at`."""
+    """Cards riding on guides, led out of the solids of the pose, world space.
+
+    Args:
+        guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
+    """
     contacts = None if pose.solids is None else _contacts(rig, cards, pose.solids)
     return follow_guides(cards, guides_now, root_turns(rig, pose), contacts)
 

@@ -100,7 +100,7 @@ class Motion:
     start_pose: Pose | None = None
 
     def drive(self, frame: FrameInput, target: Floats, held: HeldCvs | None) -> Drive:
-        """What acts in a frame that carries the guides to `target`."""
+        """What acts in a frame that carries the guides to `target`, shaped like them [m]."""
         return Drive(
             self.carried_guides,
             target,
@@ -134,7 +134,7 @@ def _carried_guides(rig: Rig, motions: RootMotions, precision: type) -> Floats:
 
 
 def motions_of(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> RootMotions:
-    """How the roots of some strands have moved since rest."""
+    """How the roots of some strands, indices (n,), have moved since rest."""
     if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
         return RootMotions.of_matrix(pose.matrix)
     triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
@@ -410,7 +410,7 @@ def _ridden_strands(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, R
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
-    """All strands in their style, in the shape of `strands_at`."""
+    """All strands in their style, (point_count, 3) [m], world space."""
     if rig.holds is None and _is_unmoved(rig, pose):
         return rig.strands.points  # as `carried_strands` would, bit for bit
     if held_guides(rig, pose) is None:

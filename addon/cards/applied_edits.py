@@ -67,7 +67,7 @@ class AppliedEdits:
 
     @property
     def kept_numbers(self) -> Ints:
-        """The numbers of the kept cards."""
+        """The numbers of the kept cards, ascending, (n,)."""
         return np.unique(self.kept_mesh.card)
 
     @property

@@ -137,8 +137,10 @@ def plan_atlas(
 
 
 def check_width(radius: Floats) -> None:
-    """Raises:
-    HairloomError: no strand has a width.
+    """Check that strands have a width. radius: of any shape [m].
+
+    Raises:
+        HairloomError: no strand has a width.
     """
     if not (radius > 0.0).any():
         raise HairloomError(

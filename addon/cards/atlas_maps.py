@@ -50,7 +50,7 @@ class AtlasMaps:
 
     @property
     def by_name(self) -> dict[str, Floats]:
-        """All maps by their names."""
+        """All maps by their names, shaped as above."""
         return {name: getattr(self, name) for name in MAP_NAMES}
 
 

@@ -64,7 +64,7 @@ def with_min_width(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
 
 
 def is_counted(column: Ints, row: Ints, strand: int, fraction: Floats) -> Bools:
-    """Whether a sample of a widened ribbon counts: `fraction` of them do, evenly spread."""
+    """Whether samples (...) of a widened ribbon count: `fraction` of them do, evenly spread."""
     x, y, z = SPARSE_STEPS
     place = (column * x + row * y + strand * z) % SPARSE_RANGE
     counted: Bools = place < fraction * SPARSE_RANGE
@@ -107,7 +107,7 @@ class Block:
         return np.stack([x + y / SAMPLES - 0.5, y], axis=-1)
 
     def overlapping(self, flat: FlatStrands, half_width: Floats, size: int) -> Ints:
-        """The strands that may lie in the block."""
+        """Indices of the strands that may lie in the block. half_width: as in FlatStrands."""
         reach = np.abs(half_width)
         low = (flat.place - reach).min(axis=1) * size
         high = (flat.place + reach).max(axis=1) * size

@@ -26,6 +26,6 @@ def card_strands(strands: StrandSet) -> StrandSet:
 
 
 def row_count(point_counts: Ints) -> int:
-    """How many rows the cards of strands with these point counts have."""
+    """How many rows the cards of strands with these point counts, (strand_count,), have."""
     served = int(np.quantile(point_counts, _SERVED, method="higher"))
     return max(min(served, _MAX_POINTS // len(point_counts)), _FEWEST)

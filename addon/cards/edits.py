@@ -75,7 +75,7 @@ class CardRecord:
 
     @classmethod
     def of(cls, strips: Strips, tile: Ints, grid: AtlasGrid, head: Surface | None) -> CardRecord:
-        """The record of new cards, before they are in a mesh."""
+        """The record of new cards with these tiles, (card_count,), before they are in a mesh."""
         places, count = card_places(strips), len(strips)
         triangle: Ints = np.zeros(count, np.int32)
         corners = np.zeros((count, 3, 3), np.float32)

@@ -68,12 +68,13 @@ class CardTracks:
         return len(self.carrier)
 
     def sample_frames(self) -> Ints:
-        """The frames from which weights are learnt, evenly chosen, ascending."""
+        """Indices of the frames from which weights are learnt, evenly chosen, ascending."""
         sample_count = min(self.frame_count, _MAX_SAMPLE_FRAMES)
         return np.linspace(0, self.frame_count - 1, sample_count).round().astype(int)
 
     def sample_vertices(self, count: int) -> Ints:
-        """This many vertices of the finest level, or all, chosen at random, ascending."""
+        """Indices of this many vertices of the finest level, or of all if there are fewer, chosen
+        at random, ascending."""
         vertex_count = len(self.levels[0].positions)
         return np.sort(
             np.random.default_rng(0).permutation(vertex_count)[: min(vertex_count, count)]

@@ -89,7 +89,7 @@ def check_views(mesh: CardMesh, count: int, size: int) -> list[SphereView]:
 def visible_fragments(
     mesh: CardMesh, head: Surface | None, view: SphereView, alpha: Floats | None = None
 ) -> VisibleFragments:
-    """The visible fragments of a view; alpha is that of the nearest texel."""
+    """The visible fragments of a view; alpha, (height, width), is that of the nearest texel."""
     fragments = rasterized(view, mesh.positions, mesh.triangles)
     fragments = fragments[fragments.nearness > surface_nearness(view, head)[fragments.pixel]]
     if alpha is None:

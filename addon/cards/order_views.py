@@ -96,7 +96,8 @@ def bounding_sphere(mesh: CardMesh) -> tuple[Floats, float]:
 
 
 def rasterized(view: SphereView, positions: Floats, triangles: Ints) -> Fragments:
-    """Samples of all triangles in this view, in the order of the triangles."""
+    """Samples of all triangles (triangle_count, 3) of positions (n, 3) [m] in this view, in the
+    order of the triangles."""
     corners = view.project(positions)[:, triangles.T]
     column, row, triangle = _candidates(corners, view.size)
     x, y, near, scale = corners

@@ -20,7 +20,7 @@ _TINY = 1e-12
 
 
 def candidate_segment_counts(max_segments: int) -> Ints:
-    """The numbers of segments that a strip may be cut into, ascending, `max_segments` the last."""
+    """The numbers of segments (n,) that a strip may be cut into, ascending to `max_segments`."""
     return np.array(
         [*(each for each in _SEGMENT_COUNTS if each < max_segments), max_segments], np.int32
     )
@@ -59,8 +59,8 @@ def fewest_segments(errors: Floats, error: float, max_segments: int) -> Ints:
 
 
 def with_segments(strips: Strips, chosen: Ints, segment_count: int) -> Strips:
-    """The chosen strips with this many segments, closer rows where they bend and at their
-    roots."""
+    """The strips with these indices, (n,), with this many segments: closer rows where they bend
+    and at their roots."""
     whole = strips.select(chosen)
     frames, places = whole.frames, _row_places(_rows_below(whole), segment_count)
     center = interpolated_rows(frames.center, places)

@@ -49,7 +49,8 @@ class CardVertices:
         return along
 
     def widened(self, root: float, tip: float) -> Floats:
-        """Positions with rows widened by factors that change linearly from root to tip."""
+        """Positions, (vertex_count, 3) [m], with rows widened by factors that change linearly from
+        root to tip."""
         along = self.along
         middle, _ = self._middles(along)
         factor = root + (tip - root) * along

@@ -42,7 +42,7 @@ class SpringColliders:
 
     @classmethod
     def spheres(cls, center: Floats, radius: Floats) -> SpringColliders:
-        """Balls without axes."""
+        """Balls without axes: centres (n, 3) [m] and radii (n,) [m]."""
         center = np.asarray(center, np.float64).reshape(-1, 3)
         return cls(center, center, np.asarray(radius, np.float64).reshape(-1))
 
@@ -93,7 +93,7 @@ class SpringChains:
         return lengths
 
     def select(self, chains: Ints) -> SpringChains:
-        """Some of the chains, possibly several times."""
+        """The chains with these indices, (n,), possibly several times."""
         return SpringChains(self.rest[chains], self.colliders, self.collides[chains])
 
 

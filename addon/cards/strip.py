@@ -62,7 +62,7 @@ class Strips:
         return len(self.width)
 
     def select(self, cards: Ints) -> Strips:
-        """The strips of the chosen cards."""
+        """The strips of cards with these indices, (n,)."""
         frames = self.frames
         parts = (frames.center, frames.tangent, frames.normal, frames.side)
         along = None if self.along is None else self.along[cards]
@@ -230,7 +230,8 @@ def _length(guides: Floats) -> float:
 
 
 def taper(along: Floats, tip_width: float) -> Floats:
-    """Width as a part of the root's: full at the root, `tip_width` at the tip, smooth between."""
+    """Width as a fraction of the root's, (...), at places along the card (...), 0 at the root and 1
+    at the tip: full at the root, `tip_width` at the tip, smooth between."""
     return 1.0 + (tip_width - 1.0) * along * along * (3.0 - 2.0 * along)
 
 

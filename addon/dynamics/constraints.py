@@ -138,7 +138,7 @@ def relax_lengths(position: Floats, length: Floats, held: Floats | None, sweeps:
     """Bring segments towards their lengths by `sweeps` relaxations from root to tip, in place.
 
     Each segment moves both of its ends by half of its error, or a single free end by all of it
-    (Jakobsen 2001).
+    (Jakobsen 2001). Arrays as of `keep_lengths`.
     """
     last = position.shape[1] - 1
     for _ in range(sweeps):
@@ -161,7 +161,7 @@ def hold_within_reach(position: Floats, length: Floats, held: Floats | None) -> 
     """Bring each CV within reach of the last pinned one, in place.
 
     Neither its straight distance nor that along the strand exceeds the strand's length there (Kim,
-    Chentanez and Mueller 2012, "Long Range Attachments").
+    Chentanez and Mueller 2012, "Long Range Attachments"). Arrays as of `keep_lengths`.
     """
     root = position[:, PINNED_COUNT - 1 : PINNED_COUNT]
     displacement = position[:, PINNED_COUNT:] - root
@@ -180,7 +180,8 @@ def shorten_segments(position: Floats, length: Floats, held: Floats | None) -> N
     That shortens zigzags, which long-range attachments alone allow.
 
     Guides with held CVs are shortened back and forth, first from these towards the root; if both
-    constraints conflict, lengths take precedence over the places of held CVs.
+    constraints conflict, lengths take precedence over the places of held CVs. Arrays as of
+    `keep_lengths`.
     """
     before = None if held is None else position.copy()
     is_due = np.ones(position.shape[2], bool)

@@ -54,10 +54,12 @@ class LengthConstraints:
     settings: DynamicsSettings
 
     def part(self, guides: Ints) -> LengthConstraints:
+        """The constraints of some guides, indices (k,)."""
         held = None if self.held is None else self.held[:, guides]
         return replace(self, length=self.length[:, guides], held=held)
 
     def keep_lengths(self, position: Floats, touching: TouchingCvs | None) -> None:
+        """Bring segments towards their lengths, in place. position: (3, cv_count, n) world [m]."""
         if self.settings.length_solver == "direct":
             keep_lengths(position, self.length, touching, self.held)
             return

@@ -133,12 +133,12 @@ class Contacts:
         )
 
     def copy_push_from(self, part: Contacts, guides: Ints, guide_count: int) -> None:
-        """Copy back the push of a `part` for these guides."""
+        """Copy back the push of a `part` for these guides, as in `part`."""
         _, selected = select_guides(self.index, guides, guide_count)
         self.push[selected] = part.push
 
     def touching_cvs(self, is_touching: Bools) -> TouchingCvs | None:
-        """The free CVs that touch."""
+        """The free CVs that touch, given which contacts (m,) do; None if none does."""
         which = is_touching.nonzero()[0]  # faster than np.flatnonzero
         if not which.size:
             return None

@@ -100,7 +100,7 @@ def check_drive(state: DynamicsState, drive: Drive, checked: tuple[Floats, ...] 
     """Check that a drive fits the state.
 
     Args:
-        checked: target arrays that have been checked before.
+        checked: targets, (guide_count, cv_count, 3), that have been checked before.
 
     Raises:
         HairloomError: a drive that does not fit the state or is not finite.

@@ -33,8 +33,8 @@ def sample_guides(grid: Floats) -> Floats:
 
 
 def sample_roots(grid: Floats) -> Floats:
-    """The pinned CVs of evenly chosen guides, which move with the head, in the shape of
-    `sample_guides`.
+    """The pinned CVs of evenly chosen guides, which move with the head, rows (3, n) float64, of a
+    grid (guide_count, cv_count, 3).
 
     All CVs if there are fewer than three guides, since two roots do not determine a rotation.
     """
@@ -44,7 +44,7 @@ def sample_roots(grid: Floats) -> Floats:
 
 
 def sample_around_mean(grid: Floats) -> Floats:
-    """`sample_guides` relative to its own mean."""
+    """`sample_guides` of a grid, relative to its own mean, (3, n) float64."""
     places = sample_guides(grid)
     return places - places.mean(axis=1, keepdims=True) if places.size else places
 

@@ -125,7 +125,8 @@ class HairGrid:
         return replace(bare, rest_density=density, pressure_threshold=pressure_threshold)
 
     def placement(self, rotation: Floats, middle: Floats) -> GridPlacement:
-        """The grid's place once the groom has turned, with the middle of its roots at `middle`."""
+        """The grid's place once the groom has turned by a rotation (3, 3), with the middle of its
+        roots at `middle`, (3,) world [m]."""
         return GridPlacement(
             np.asarray(middle, np.float32),
             (np.asarray(rotation, np.float64).T / self.cell).astype(np.float32),
@@ -260,8 +261,7 @@ class NeighbourCvs:
     """CVs of other grooms.
 
     position: (3, n) float32 world [m], where they are deposited. motion: (3, n) [m], their motion
-        in a
-        substep. mass: (n,) whole float32, see `HairGrid`.
+        in a substep. mass: (n,) whole float32, see `HairGrid`.
     """
 
     position: Floats
@@ -397,7 +397,7 @@ class GridSample:
 
 
 def neighbour_sums(placement: GridPlacement, neighbour_cvs: NeighbourCvs, cell: float) -> Floats:
-    """The sums of other hair, see `_sums`, from its CVs in the cells around the groom."""
+    """The sums of other hair from its CVs in the cells around the groom, shaped as `_sums`."""
     fraction = placement.to_cells(neighbour_cvs.position)
     nearest = np.floor(fraction + np.float32(0.5))
     low, counts = (

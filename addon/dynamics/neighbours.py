@@ -168,7 +168,7 @@ class LinearMotion:
 
     @cached_property
     def guides_at_ends(self) -> tuple[Floats, Floats]:
-        """The guides at begin and end, with the same shape."""
+        """The guides at begin and end, in the shape that they have at the end."""
         end = self.read_guides_at_end()
         if self.guides_at_begin.shape != end.shape:
             return end, end

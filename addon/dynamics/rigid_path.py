@@ -286,6 +286,7 @@ class CarriedPath:
         ratio: float,
         carrier: Carrier | None,
     ) -> CarriedPath:
+        """The path through places (3, ...) world [m]; the others as in `trajectory.curvature`."""
         if carrier is not None:
             path = carrier.path
             now = carrier.transform_back(path.now).apply(now)

@@ -166,12 +166,12 @@ def rows_of(grid: Floats, place: str) -> Floats:
 
 
 def as_rows(grid: Floats) -> Floats:
-    """`rows_of` without checks."""
+    """`rows_of` without checks: (3, cv_count, guide_count) float32."""
     return np.ascontiguousarray(grid.transpose(2, 1, 0), np.float32)
 
 
 def checked_grid(grid: Floats, place: str) -> Floats:
-    """The grid itself, checked.
+    """The grid itself, checked: (guide_count, cv_count, 3).
 
     Raises:
         HairloomError: another shape, or a value that is not finite.

@@ -79,7 +79,7 @@ class LocalShape:
 
     @cached_property
     def turning_curvature(self) -> Floats:
-        """The part of the curvature that turns with the strand, in the shape of `curvature`."""
+        """The part of the curvature that turns with the strand [m], in the shape of `curvature`."""
         return self.curvature * self.turning_fraction
 
     @cached_property

@@ -40,7 +40,7 @@ def clamped_ratio(ratio: float) -> float:
 def value_at(
     before: Floats, displacement: Floats, curvature: Floats | None, moment: float
 ) -> Floats:
-    """The value at a moment of the frame, 0 its begin and 1 its end."""
+    """The value at a moment of the frame, 0 its begin and 1 its end; any shape and unit."""
     number = before.dtype.type
     if curvature is None:
         return before + displacement * number(moment)

@@ -95,7 +95,7 @@ def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> CurveSampling
 
 
 def usable_basis(basis: str, counts: Ints) -> tuple[str, tuple[str, ...]]:
-    """The basis to read curves with, and notes on it.
+    """The basis to read curves of these point counts, (curve_count,), with; and notes on it.
 
     Where most Bezier curves have a number of points that such curves cannot have, the file holds
     points on the curves, as Blender writes them for hair.

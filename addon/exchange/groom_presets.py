@@ -89,7 +89,7 @@ def select_parts(groom: Groom, parts: str) -> Groom:
 
 
 def selected_strands(groom: Groom, parts: str) -> Ints:
-    """Indices of the strands that `select_parts` takes."""
+    """Indices (n,) of the strands that `select_parts` takes."""
     count = groom.strands.strand_count
     if parts == "both" or (parts == "strands" and groom.is_guide is None):
         return np.arange(count)

@@ -67,7 +67,7 @@ def usable_strands(
 
 
 def finite_or_zero(values: Floats, minimum: float = -np.inf) -> Floats:
-    """Values, with 0 instead of those that are not finite or less than `minimum`."""
+    """Values of any shape, with 0 instead of those that are not finite or less than `minimum`."""
     is_sound = np.isfinite(values) & (values >= minimum)
     return values if is_sound.all() else np.where(is_sound, values, np.float32(0.0))
 

@@ -49,7 +49,11 @@ def _positions_at(times: Floats, own_times: Floats | None, positions: Floats) ->
 
 def valid_motion(times: Floats, positions: Floats) -> tuple[ReadMotion | None, str]:
     """The motion before the first time that no scene has or at which a point is not finite, and a
-    note on that."""
+    note on that.
+
+    Args:
+        times: (n,) [s]. positions: (n, point_count, 3) [m].
+    """
     is_finite, is_near = np.isfinite(positions).all(axis=(1, 2)), np.abs(times) < _LATEST
     is_sound = is_finite & is_near
     count = len(times) if is_sound.all() else int(is_sound.argmin())

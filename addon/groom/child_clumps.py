@@ -48,7 +48,7 @@ class Clumps:
         return found
 
     def with_middles(self, chosen: Ints) -> Ints:
-        """These children and all that their shapes depend on, ascending."""
+        """The indices (n,) of children and of all that their shapes depend on, ascending."""
         found = np.unique(chosen)
         while len(more := np.setdiff1d(self.middle[found], found)):
             found = np.union1d(found, more)

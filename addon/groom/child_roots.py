@@ -60,7 +60,7 @@ class ChildRoots:
     notes: tuple[str, ...]
 
     def take(self, chosen: Ints) -> ChildRoots:
-        """Some of them, without notes."""
+        """The roots with these indices, (k,), without notes."""
         return ChildRoots(
             self.triangle[chosen],
             self.barycentric[chosen],

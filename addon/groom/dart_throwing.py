@@ -36,6 +36,7 @@ class Samples:
         return len(self.triangle)
 
     def take(self, chosen: Bools | Ints) -> Samples:
+        """The chosen samples, as a mask (n,) or as indices (k,)."""
         index = np.flatnonzero(chosen) if chosen.dtype == bool else chosen
         # numpy takes rows in a third of the time in which it indexes them
         return Samples(

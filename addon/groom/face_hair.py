@@ -72,7 +72,8 @@ def grow_face_hair(
 ) -> StrandSet:
     """Brows and lashes, in groups of their own, so that guides on the scalp never move them.
 
-    See `grow_brows` and `grow_lashes`.
+    Args:
+        brows, lashes: (vertex_count,), the density of `grow_brows` and the rim of `grow_lashes`.
     """
     hair = hair or FaceHair()
     return join_strands(grow_brows(surface, brows, hair), grow_lashes(surface, lashes, hair))

@@ -85,6 +85,7 @@ class OuterSkinSearch:
         self._search = ClosestPointSearch(outer)
 
     def closest(self, points: Floats) -> ClosestPoints:
+        """The points closest to these, (n, 3) [m], on triangles of the whole target."""
         found = self._search.closest(points)
         triangle: Ints = self._triangles[found.triangle].astype(np.int32)
         return replace(found, triangle=triangle)

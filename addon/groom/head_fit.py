@@ -187,7 +187,9 @@ def fit_by_vertices(source: Floats, target: Floats, is_head: Bools) -> Warp:
 
 
 def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats], bool]:
-    """Guessed landmarks on a mesh that stands upright, Z up; and whether it is like a head."""
+    """Guessed landmarks by name, (3,) [m] each, on a mesh that stands upright, Z up; and whether it
+    is like a head.
+    """
     matrix, away = _guessed_similarity(model, target)
     own = np.array(list(_own_landmarks(model).values()))
     if away < _UNLIKE:

@@ -43,7 +43,7 @@ class Holds:
         return self.tie_count + (0 if self.tip_triangle is None else len(self.tip_triangle))
 
     def for_strands(self, chosen: Ints) -> Holds:
-        """The holds of some strands, ascending, renumbered among these strands."""
+        """The holds of some strands, (k,) ascending, renumbered among these strands."""
         place = np.searchsorted(chosen, self.strand)
         kept = np.flatnonzero(np.take(chosen, place, mode="clip") == self.strand)
         return self._some(kept, place[kept])

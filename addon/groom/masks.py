@@ -64,7 +64,7 @@ class Places:
 
     @classmethod
     def of_strands(cls, strands: StrandSet, chosen: Ints) -> Places:
-        """Where some of the artist's own strands grow."""
+        """Where these of the artist's own strands grow, indices (n,)."""
         triangle, barycentric = strands.root_triangle, strands.root_barycentric
         return cls(
             None if triangle is None else triangle[chosen],
@@ -106,7 +106,7 @@ class Mask:
         raise NotImplementedError
 
     def for_strands(self, strands: Ints) -> Mask:
-        """The mask of some of the artist's strands, renumbered among these."""
+        """The mask of some of the artist's strands, (n,), renumbered among these."""
         return self
 
     @property
@@ -291,9 +291,11 @@ class Factors:
         return np.ones(self.count) if found is None else found
 
     def rows(self, names: tuple[str, ...]) -> tuple[Floats, ...]:
+        """The factors of these parameters, (count,) each."""
         return tuple(self[name] for name in names)
 
     def take(self, chosen: Ints) -> Factors:
+        """The factors of some, indices (n,)."""
         return Factors(len(chosen), {name: each[chosen] for name, each in self.painted.items()})
 
     def concatenated(self, more: Factors) -> Factors:

@@ -56,6 +56,7 @@ class Mirrored:
 
     @property
     def is_shifted(self) -> Bools:
+        """Which strands were moved, (strand_count,)."""
         return np.asarray((self.shift != 0.0).any(axis=1))
 
 

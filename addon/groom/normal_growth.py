@@ -100,7 +100,9 @@ def _directions(
 
 
 def density_with_length(density: Floats | None, length: Floats | None) -> Floats | None:
-    """The density, set to 0 where hair would have no length."""
+    """The density, set to 0 where hair would have no length; both (vertex_count,), None: not
+    painted.
+    """
     if length is None:
         return density
     grows = (length > 0.0).astype(np.float64)

@@ -120,7 +120,7 @@ def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Fl
 
 
 def smooth_step(value: Floats) -> Floats:
-    """0 below 0, 1 above 1, and a smooth rise between them."""
+    """0 below 0, 1 above 1, and a smooth rise between them; of any shape."""
     x = np.clip(value, 0.0, 1.0)
     smooth: Floats = x * x * (3.0 - 2.0 * x)
     return smooth

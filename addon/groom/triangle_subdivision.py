@@ -72,6 +72,7 @@ class Pieces:
         return replace(self, density=np.einsum("nck,nk->nc", self.corner, whole))
 
     def take(self, chosen: Bools) -> Pieces:
+        """The pieces that a mask (n,) chooses."""
         return Pieces(
             self.parent[chosen],
             self.corner[chosen],

@@ -96,7 +96,7 @@ class Widths:
 
     @classmethod
     def of(cls, numbers: Floats, reason: str) -> Self:
-        """The inverse of `numbers`; earlier versions had no spacing."""
+        """The inverse of `numbers`, (5,); bakes of earlier versions have (4,), without spacing."""
         is_found, median, hairs, extinction, *spacing = numbers.tolist()
         return cls(bool(is_found), median, hairs, extinction, reason, *spacing)
 

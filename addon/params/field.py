@@ -237,7 +237,7 @@ class Settings:
         )
 
     def painted(self, name: str, factor: Floats) -> Floats:
-        """A number multiplied by painted factors, clamped to its hard range."""
+        """A number multiplied by painted factors (n,), clamped to its hard range."""
         (parameter,) = (each for each in self.parameters() if each.name == name)
         return np.clip(getattr(self, name) * factor, *(parameter.hard_range or (None, None)))
 

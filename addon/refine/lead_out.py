@@ -216,7 +216,7 @@ class LedOut:
         return cls(strands.astype(np.int32), points[point_indices(strands, offsets)], deflections)
 
     def fits(self, offsets: Ints) -> bool:
-        """Whether strands and point counts match these offsets."""
+        """Whether strands and point counts match these offsets, (strand_count + 1,)."""
         count = len(offsets) - 1
         if len(self.strands) and not 0 <= self.strands.min() <= self.strands.max() < count:
             return False

@@ -121,7 +121,8 @@ def node_spacing(width: int, height: int) -> float:
 
 
 def bright_regions(cells: Floats, width: int, height: int) -> BrightRegions:
-    """The regions of the bright part, from the sums of `bright_cells`."""
+    """The regions of the bright part of a picture of this size [pixels], from the sums (rows,
+    columns, 4) of `bright_cells`."""
     sums = np.asarray(cells, np.float64).reshape(-1, 4)
     scale = float(np.clip(2.0 * (1.0 - sums[:, 3].sum() / (width * height)), 0.0, 1.0))
     sums = sums[sums[:, 0] > 0.0]

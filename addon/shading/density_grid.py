@@ -65,7 +65,7 @@ class Grid:
         return Grid.of_cells(first, last - first, self.cell)
 
     def crop(self, values: Floats, whole: Grid) -> Floats:
-        """This grid's values out of those of a grid that contains it."""
+        """This grid's values, shaped as its cells, out of those of a grid that contains it."""
         first = self.first - whole.first
         x, y, z = map(slice, first, first + np.array(self.shape))
         return values[x, y, z]

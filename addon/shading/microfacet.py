@@ -23,7 +23,7 @@ def dielectric_fresnel(cosine: Floats, specular: float) -> Floats:
     """The fraction of light that a smooth dielectric reflects.
 
     Args:
-        cosine: of the angle between light and normal, 0 to 1.
+        cosine: (...) of the angle between light and normal, 0 to 1.
         specular: that fraction at normal incidence, which determines the index of refraction.
     """
     root = np.sqrt(min(specular, 0.999))
@@ -37,6 +37,7 @@ def dielectric_fresnel(cosine: Floats, specular: float) -> Floats:
 
 
 def smith_height(cosine: Floats, alpha_squared: float) -> Floats:
+    """The root in the shadowing function of Smith for GGX, at the cosine of an angle, (...)."""
     return np.sqrt(alpha_squared + (1.0 - alpha_squared) * cosine * cosine)
 
 
@@ -67,7 +68,7 @@ def reflected_fraction(cos_eye: Floats, specular: float, roughness: float) -> Fl
     """Approximate fraction of light from all around that the boundary reflects to the eye.
 
     Args:
-        cos_eye: cosine of the angle between eye and normal.
+        cos_eye: (...) cosine of the angle between eye and normal.
     """
     if specular <= 0.0:
         return np.zeros_like(cos_eye)

@@ -105,7 +105,7 @@ def skin_seen_from(values: Floats) -> SkinSeen:
 
 def through_hair(depth: Floats, absorbed: Floats) -> Floats:
     """The light through hair with gaps whose strands absorb the fraction `absorbed` of what they
-    meet, over that through hair whose strands absorb ABSORBED_FRACTION."""
+    meet, over that through hair whose strands absorb ABSORBED_FRACTION. Both (...)."""
     result: Floats = (
         (1.0 + CLUMPING * depth * absorbed) / (1.0 + CLUMPING * depth * ABSORBED_FRACTION)
     ) ** (-1.0 / CLUMPING)
@@ -122,6 +122,9 @@ def far_skin_light(received: Floats, to_light: Floats) -> Floats:
     """The fraction of a light that arrives off far skin through hair that absorbs
     ABSORBED_FRACTION, (...): a part that depends on the angle between the light and `received`, and
     an even rest.
+
+    Args:
+        received: (..., 4) mean and vector of the light. to_light: (..., 3) unit vector.
     """
     mean, vector = received[..., 0], received[..., 1:]
     size = np.linalg.norm(vector, axis=-1)

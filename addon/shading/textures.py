@@ -73,7 +73,7 @@ class HairTextures:
         return np.concatenate([base, alpha[..., None]], axis=-1)
 
     def with_pictures(self, pictures: Mapping[str, Floats]) -> HairTextures:
-        """The textures with some replaced by pictures, by name, see `picture_as`."""
+        """The textures with some replaced by pictures, by name, shaped as `picture_as` does."""
         return replace(self, **pictures)
 
 

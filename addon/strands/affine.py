@@ -32,7 +32,7 @@ def transform_points(points: Floats, matrix: Floats) -> Floats:
 
 
 def mean_scale(matrix: Floats) -> float:
-    """The mean scale of an affine matrix: the cube root of its change of volume."""
+    """The mean scale of an affine (4, 4) matrix: the cube root of its change of volume."""
     return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
 
 

@@ -77,7 +77,7 @@ def length_fractions(points: Floats, offsets: Ints) -> Floats:
 
 
 def length_fractions_from(length: Floats, offsets: Ints) -> Floats:
-    """`length_fractions`, computed from the result of `arc_lengths`."""
+    """`length_fractions`, (point_count,), computed from the result of `arc_lengths`."""
     whole = np.repeat(length[offsets[1:] - 1], np.diff(offsets))
     fraction = np.divide(length, whole, out=even_fractions(offsets), where=whole > 0.0)
     fraction[offsets[1:] - 1] = 1.0

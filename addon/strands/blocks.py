@@ -33,6 +33,9 @@ class Block:
 
     @classmethod
     def of(cls, strands: Ints, offsets: Ints) -> Block:
+        """The block of strands (n,), which ascend where their point counts are equal; offsets as of
+        `blocks_of`.
+        """
         counts = offsets[strands + 1] - offsets[strands]
         count, first, after = int(counts.max()), int(strands[0]), int(strands[-1]) + 1
         if counts.min() == count and after - first == len(strands):

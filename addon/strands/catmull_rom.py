@@ -28,7 +28,9 @@ def points_on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
 
 
 def catmull_rom(points: Sequence[Floats], t: Floats) -> Floats:
-    """The curve between the second of four points, at t = 0, and the third, at t = 1."""
+    """The curve between the second of four points, at t = 0, and the third, at t = 1; all arrays
+    broadcast.
+    """
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
     chord = p2 - p1

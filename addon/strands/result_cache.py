@@ -65,7 +65,9 @@ class ResultCache:
         return result
 
     def nearest(self, name: str, places: Floats, others: Floats, count: int) -> tuple[Ints, Floats]:
-        """`nearest_points`, searched only for the places whose nearest points may have changed."""
+        """`nearest_points` of places (n, 3) among others (m, 3), searched only for the places whose
+        nearest points may have changed.
+        """
         if self._is_disabled:
             return nearest_points(places, others, count)
         last = self._nearest.get(name)

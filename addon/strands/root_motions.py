@@ -57,7 +57,9 @@ class RootMotions:
         return rest + self.displacement(np.ascontiguousarray(rest.T), strands).T
 
     def take(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
-        """The motions of some strands, shaped to broadcast over arrays of 2 or 3 dimensions."""
+        """The motions of strands (k,), which broadcast over `dimensions`: 2 for planes (3, k), or 3
+        for (3, m, k).
+        """
         found = []
         for values in (self.turn, self.shift, self.origin):
             if values.shape[-1] > 1:

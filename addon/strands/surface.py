@@ -62,7 +62,7 @@ class Surface:
         return unit(area_vectors(self.corners))
 
     def welded_triangles(self) -> Ints:
-        """The triangles with coincident vertices merged, as numbers of places, like `triangles`."""
+        """Triangles with coincident vertices merged, as numbers of places, (triangle_count, 3)."""
         triangles: Ints = self.compute_once(_places)[self.triangles]
         return triangles
 

@@ -45,7 +45,8 @@ class MovingPlanes:
     def push_out(
         self, position: Floats, previous: Floats, number: int, steps: int, friction: float
     ) -> None:
-        """Push vertices out in small step `number` of `steps`, in place, without bouncing."""
+        """Push vertices (3, n) world [m] out in small step `number` of `steps`, in place, without
+        bouncing."""
         known = self.contacts
         fraction = np.float32((number + 1) / steps)
         origin = previous.take(known.index, axis=1)

@@ -106,7 +106,8 @@ class DistanceField:
 
     @cached_property
     def bounds(self) -> tuple[Floats, float]:
-        """Bounding sphere of inside nodes and the cells beside them that the surface crosses."""
+        """Bounding sphere, (3,) and radius [m], of inside nodes and the cells beside them that the
+        surface crosses."""
         inside = np.argwhere(self.values < 0.0).astype(np.float32)
         if not len(inside):
             half = self._top[:, 0] * np.float32(self.cell / 2.0)

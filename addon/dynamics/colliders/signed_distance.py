@@ -49,7 +49,8 @@ def poses_at_end(colliders: Sequence[PosedCollider]) -> list[Pose]:
 
 
 def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Floats, Floats]:
-    """`signed_distance` with `poses_at_end` computed once for several queries."""
+    """`signed_distance` of points (n, 3) world [m], with `poses_at_end` computed once for several
+    queries."""
     distance = np.full(len(points), reach, np.float32)
     outward = np.zeros((len(points), 3), np.float32)
     index, found, normal = nearer_than(points, poses, reach)

@@ -112,7 +112,7 @@ def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int,
 
 
 def are_too_deep(planes: list[list[Plane]], x: Floats) -> bool:
-    """Whether any point is farther below its plane than allowed."""
+    """Whether any point is farther below its plane than allowed. x: (cv_count, 3) world [m]."""
     return any(plane.gap(x) > plane.allowed_depth for group in planes for plane in group)
 
 
@@ -170,7 +170,7 @@ class SubstepCollider:
         return result
 
     def origin(self, x: Floats, previous: Floats) -> Floats:
-        """Where a point would be had it moved with the collider."""
+        """Where a point (3,) world [m] would be had it moved with the collider."""
         result: Floats = previous + (self.displacement @ np.append(self.local(x), 1.0))[:3]
         return result
 

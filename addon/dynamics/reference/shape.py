@@ -15,7 +15,11 @@ from ..style import GENTLE_BEND, SHARP_KINK
 
 
 def turning_fraction(rest_second: Floats, length: float) -> float:
-    """1 for gentle bends, 0 for sharp kinks, linear in between."""
+    """1 for gentle bends, 0 for sharp kinks, linear in between.
+
+    Args:
+        rest_second: (3,) [m], a segment minus the one before it. length: of a segment [m].
+    """
     sharpness = float(np.linalg.norm(rest_second)) / length if length else 2.0
     return min(max((SHARP_KINK - sharpness) / (SHARP_KINK - GENTLE_BEND), 0.0), 1.0)
 

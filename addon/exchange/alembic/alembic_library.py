@@ -52,7 +52,11 @@ def imath_array(library: Any, values: Floats | Ints) -> Any:
 
 
 def parameter_sample(library: Any, values: Floats | Ints, scope: str) -> Any:
-    """Values of a geometry parameter; `scope` is "Constant", "Uniform" or "Vertex"."""
+    """Values (n,) or (n, width) of a geometry parameter.
+
+    Args:
+        scope: "Constant", "Uniform" or "Vertex".
+    """
     make = getattr(library.geom, f"O{_PARAMETER[_kind(values)]}GeomParamSample")
     return make(imath_array(library, values), geometry_scope(library, scope))
 

@@ -92,7 +92,7 @@ def spring_list(rig: SpringRig) -> list[dict[str, Any]]:
 
 
 def collider_list(balls: SpringColliders, root: Floats) -> list[dict[str, Any]]:
-    """Balls and capsules, in the space of the root joint."""
+    """Balls and capsules, in the space of the root joint, which is at `root`, (3,) [m]."""
     shapes: list[dict[str, Any]] = []
     for center, tail, radius in zip(balls.center, balls.tail, balls.radius, strict=True):
         shape = {"offset": _to_file(center - root), "radius": float(radius)}

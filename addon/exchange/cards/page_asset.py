@@ -82,7 +82,8 @@ def _with_values(file: GlbFile, values: Mapping[int, Floats]) -> GlbFile:
 
 
 def small_maps(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[str, Floats]:
-    """Maps of at most `size` texels a side, in as few different values as they need.
+    """Maps (height, width, ...) of at most `size` texels a side, in as few different values as they
+    need.
 
     Where there is no hair, maps of alpha's size get their own mean over the hair.
     """

@@ -24,7 +24,7 @@ def to_z_up(points: Floats, up: str) -> Floats:
 
 
 def from_z_up(points: Floats, up: str) -> Floats:
-    """From Blender's axes to a file's, the inverse of `to_z_up`."""
+    """Points (..., 3) from Blender's axes to a file's, the inverse of `to_z_up`."""
     if _is_y_up(up):
         return np.stack([points[..., 0], points[..., 2], -points[..., 1]], axis=-1)
     return points

@@ -29,7 +29,7 @@ class FileSpace:
         return np.asarray(turned, np.float32) * np.float32(self.units_per_metre)
 
     def from_file(self, points: Floats) -> Floats:
-        """The inverse of `to_file`; exact where the unit is the metre."""
+        """Points (..., 3) [m], the inverse of `to_file`; exact where the unit is the metre."""
         metres = np.asarray(points, np.float32) / np.float32(self.units_per_metre)
         return self._mirrored(to_z_up(metres, self.up))
 

@@ -80,7 +80,7 @@ def write_card_textures(
 
 
 def resized_to_largest(maps: Mapping[str, Floats]) -> dict[str, Floats]:
-    """All maps in the largest size; pixels are repeated."""
+    """All maps (height, width, ...) in the largest size; pixels are repeated."""
     height, width = np.max([image.shape[:2] for image in maps.values()], axis=0)
     row, column = np.arange(height)[:, None], np.arange(width)
     return {

@@ -251,7 +251,8 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
 
 
 def texture_layouts(preset: str, maps: Mapping[str, Floats]) -> list[TextureLayout]:
-    """The files of a preset, without those of which all maps are missing.
+    """The files of a preset for these maps, (height, width, ...), without those of which all maps
+    are missing.
 
     Raises:
         HairloomError: no such preset, no map at all, another map than those of MAP_MEANINGS, or

@@ -84,7 +84,8 @@ def marschner_tables(fibre: Fibre, size: int = DEFAULT_SIZE) -> MarschnerTables:
 
 
 def longitudinal_table(fibre: Fibre, size: int) -> Floats:
-    """M_R, M_TT, M_TRT and cos theta_d by the two inclinations, level by level."""
+    """M_R, M_TT, M_TRT and cos theta_d by the two inclinations, (LEVELS, size, size, 4): rows by
+    theta_r, columns by theta_i."""
     theta = np.linspace(-0.5 * np.pi, 0.5 * np.pi, size)
     theta_i, theta_r = theta[None, :], theta[:, None]
     table = np.empty((LEVELS, size, size, 4), np.float32)
@@ -97,7 +98,8 @@ def longitudinal_table(fibre: Fibre, size: int) -> Floats:
 
 
 def azimuthal_tables(fibre: Fibre, size: int) -> tuple[Floats, Floats]:
-    """N_p of the clear fibre and the lengths of their paths, by cos theta_d and phi."""
+    """N_p of the clear fibre and the lengths of their paths, (size, size, 4) each: rows by phi,
+    columns by cos theta_d."""
     axis = np.linspace(0.0, 1.0, size)
     cos_d, phi = axis[None, :], np.pi * axis[:, None]
     fibre, width = replace(fibre, absorption=_FITTED), fibre.azimuthal_width

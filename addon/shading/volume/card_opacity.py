@@ -45,7 +45,7 @@ MIN_TAU_DIFFERENCE = 1.0e-3
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
-    """tau that light meets in a card of thickness 1, (...)."""
+    """tau that light meets in a card of thickness 1 and this alpha, (...)."""
     return -np.log1p(-np.minimum(alpha, MAX_ALPHA))
 
 

@@ -94,12 +94,12 @@ def fractions(tables: MarschnerTables, size: int = FRACTIONS_SIZE) -> Fractions:
 
 
 def table_coordinate(absorption: Floats) -> Floats:
-    """Where an absorption lies in the table, 0 to 1."""
+    """Where an absorption (...) lies in the table, 0 to 1."""
     return absorption / (absorption + MIDPOINT)
 
 
 def absorption_at_coordinate(coordinate: Floats | float) -> Floats:
-    """The absorption at a coordinate of the table; its end is that of black hair."""
+    """The absorption at a coordinate (...) of the table; its end is that of black hair."""
     inside = np.minimum(coordinate, 1.0 - 1e-3)
     return np.asarray(MIDPOINT * inside / (1.0 - inside))
 
@@ -209,7 +209,7 @@ def spread_around(forward: Floats, backward: Floats, phi: Floats) -> Floats:
 
 
 def half_gaussian(theta_h: Floats, shift: Floats, variance: Floats) -> Floats:
-    """Half of the unit Gaussian of theta_h about -shift: Marschner's M_p."""
+    """Half of the unit Gaussian of theta_h about -shift [rad], (...): Marschner's M_p."""
     variance = np.maximum(variance, _SMALLEST)
     return np.exp(-0.5 * (theta_h + shift) ** 2 / variance) / (
         2.0 * np.sqrt(2.0 * np.pi * variance)

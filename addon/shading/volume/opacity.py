@@ -128,7 +128,7 @@ class LayerSpans:
         return start, np.maximum(thickness, MIN_THICKNESS)
 
     def fraction(self, row: Ints, column: Ints, place: Floats, depth: Floats) -> Floats:
-        """A depth at a place, as a fraction of the layers of texels, see `at`."""
+        """A depth (...) at a place, as a fraction of the layers of texels, see `at`."""
         start, thickness = self.at(row, column, place)
         return (depth - start) / thickness
 
