@@ -147,6 +147,7 @@ class Rig:
         in which they are grown. None: all.
     widths: how wide the strands are, and why.
     children_line: for the artist, whether automatic children were added, and why; may be empty.
+    suggested_children_method: of `ChildrenSettings`, which this line suggests; may be empty.
     holds: where strands are held by ties or by a surface; None: nowhere.
     grown_children: how they have grown; None without any, and in a rig that comes from a bake.
     baked_baby_hair: the strands that are baby hair, in a rig that comes from a bake.
@@ -165,10 +166,11 @@ class Rig:
     holds: Holds | None = None
     grown_children: GrownChildren | None = None
     baked_baby_hair: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
+    suggested_children_method: str = ""
 
     @property
     def baby_hair(self) -> Ints:
-        """The strands that are short, fine hair of the hairline and of partings."""
+        """Indices of the strands that are short, fine hair of the hairline and of partings."""
         if self.grown_children is None or self.own_count is None:
             return self.baked_baby_hair
         return self.own_count + np.flatnonzero(
@@ -427,24 +429,25 @@ def _with_automatic_children(
     """
     hair = rig.strands.take(_parents(rig.strands))
     settings, parts = automatic_settings(hair, settings)
-    count, line = hair.strand_count, ""
+    count, line, suggested = hair.strand_count, "", ""
     if is_too_sparse(hair):
+        suggested = "multi"
         line = (
             f"Children: none, since {count:,} curves may be guides or a part of the hair. Set "
             "Method to Between Guides to fill the space between them"
         )
-    if parts > 1.0 and rig.head is None:
+    elif parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface to grow them on"
     own, found = with_widths(rig.strands, widths, parts, cache=growing.cache)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
         with_children = _with_children(rig, settings, growing, place)
-        rig = replace(with_children, widths=found)
+        rig, suggested = replace(with_children, widths=found), "none"
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for full "
             "hair. Set Method to None to see only the curves"
         )
-    return replace(rig, children_line=line)
+    return replace(rig, children_line=line, suggested_children_method=suggested)
 
 
 def _weights(

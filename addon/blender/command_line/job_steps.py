@@ -58,11 +58,6 @@ _SUMS = ("strands", "guides", "held_strands", "children", "points")
 _EXTREMES = ("cv_count", "points_of_a_strand_max")
 #: facts that are only reported for each groom
 _OF_EACH = ("widths", "children_line")
-#: what the panel calls a remedy -> the option that does it
-_OPTIONS_OF_REMEDIES = {
-    "Set Method to None": "--set children.method=none",
-    "Set Method to Between Guides": "--set children.method=multi",
-}
 #: settings that a bake is made with, and keeps
 _BAKED = (GrowSettings, GuideSettings, ChildrenSettings, WidthSettings, DynamicsSettings)
 
@@ -135,8 +130,8 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
         rig = rig_from(_source(job, inputs), job.settings, place=inputs.groom_name)
     report_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     children_line = rig.children_line
-    for words, option in _OPTIONS_OF_REMEDIES.items():
-        children_line = children_line.replace(words, f"{words} ({option})")
+    if rig.suggested_children_method:
+        children_line += f" (--set children.method={rig.suggested_children_method})"
     for line in filter(None, (children_line, rig.widths.line, rig.guides_line)):
         print(f"{line}.", flush=True)
     report_rig(report, rig, inputs.groom_name)

@@ -80,6 +80,7 @@ def test_few_strands_get_the_children_that_cover_the_body(across: int, length: f
     assert hits(covered).mean() >= 0.87 * 4.0 > hits(bare).mean()
     assert (hits(covered) == 0.0).mean() < 0.05 < (hits(bare) == 0.0).mean()
     assert f"{covered.child_count:,} added, since {across**2:,} curves" in covered.children_line
+    assert covered.suggested_children_method == "none"
     assert 0 < covered.child_count < 300_000
     assert covered.notes == ()
 
@@ -117,6 +118,7 @@ def test_a_few_curves_may_be_anything() -> None:
     """They could be guides, fly-aways or whiskers, so the artist decides."""
     rig = rig_of(fur(30, 0.2), sheet())
     assert rig.child_count == 0 and "900 curves may be guides" in rig.children_line
+    assert rig.suggested_children_method == "multi"
     assert rig_of(fur(1, 0.2), sheet()).children_line == ""
 
 
@@ -182,6 +184,7 @@ def test_a_row_of_lashes_is_left_alone() -> None:
 def test_without_a_surface_the_line_says_why() -> None:
     rig = rig_of(fur(32, 0.05), None)
     assert rig.child_count == 0 and "no surface" in rig.children_line and rig.notes == ()
+    assert rig.suggested_children_method == ""
     assert rig_of(fur(190, 0.2), None).children_line == ""
 
 
