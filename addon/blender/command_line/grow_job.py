@@ -10,6 +10,7 @@ from ...groom.settings import GrowSettings
 from ..base.parts import run_parts
 from ..scene.masks import read_map
 from ..setup.starting import new_groom
+from .job_options import add_density_options
 from .job_steps import Job
 from .object_settings import change_settings, check_sections, named_objects
 from .verb import Verb
@@ -57,25 +58,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="scale lengths and motion to the mesh, unless it has the size of a head or body; "
         "presets and --set override this",
     )
-    what.add_argument(
-        "--density-group",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute of the mesh with the density of the hair",
-    )
-    what.add_argument(
-        "--length-group",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute with the length of the hair, as a fraction of grow.length",
-    )
-    what.add_argument(
-        "--children-density",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute with the density of the children (with --set "
-        "children.method=multi)",
-    )
+    add_density_options(what)
 
 
 GROW = Verb(

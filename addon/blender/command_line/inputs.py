@@ -49,8 +49,8 @@ class Sources:
     head_scale: of the files of head and collider.
     need_head: whether a groom without a head is refused.
     need_uv: whether a head without UVs is refused.
-    density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
-        for hair that is grown here.
+    density_group, length_group: vertex groups, attributes or images of a head in the open scene, by
+        name, for hair that is grown here.
     children_density: the same for the children between guides.
     skin: of the built-in head if it has no materials, one of bust_skin.TONES.
     with_face: whether to add brows and lashes to a groom of the scene on the built-in head.

@@ -77,25 +77,7 @@ def add_hair_options(parser: argparse.ArgumentParser, *, takes_several: bool = F
         help="up axis of a groom file (default: as stored in the file)",
     )
     add_head_scale_option(sources, "scale of the files of head and collider (default: 1)")
-    sources.add_argument(
-        "--density-group",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute of the head with the density of the hair",
-    )
-    sources.add_argument(
-        "--length-group",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute with the length of the hair, as a fraction of grow.length",
-    )
-    sources.add_argument(
-        "--children-density",
-        default="",
-        metavar="NAME",
-        help="vertex group or attribute with the density of the children (with --set "
-        "children.method=multi)",
-    )
+    add_density_options(sources)
     sources.add_argument(
         "--skin",
         choices=tuple(TONES),
@@ -119,6 +101,20 @@ def name_grooms(options: argparse.Namespace) -> None:
         names = [*options.grooms, *(obj.name for obj in objects)]
         options.grooms = list(dict.fromkeys(names))
         options.groom = options.grooms[0] if options.grooms else None
+
+
+def add_density_options(parser: Any) -> None:
+    """Add options for maps of the head: where hair grows, how long, and where its children grow."""
+    map_kinds = "vertex group, attribute or image of the head"
+    for name, what in (
+        ("--density-group", "with the density of the hair"),
+        ("--length-group", "with the length of the hair, as a fraction of grow.length"),
+        (
+            "--children-density",
+            "with the density of the children (with --set children.method=multi)",
+        ),
+    ):
+        parser.add_argument(name, default="", metavar="NAME", help=f"{map_kinds} {what}")
 
 
 def add_head_scale_option(parser: Any, help_text: str) -> None:
