@@ -184,9 +184,9 @@ def page(results: Mapping[str, Any]) -> str:
     lines = [
         "# Figures",
         "",
-        "Written by `make bench`. Do not edit this page. Each section is what one benchmark of",
-        "`bench/` found, run short so that all of them take half an hour. `make bench NAME=x` runs",
-        "one whole. The other pages quote these figures.",
+        "What is measured, how, and the results. Each section is one benchmark of `bench/`, run",
+        "short so that all of them take half an hour. `make bench NAME=x` runs one whole. The",
+        "other pages quote these figures. This page is made by `make bench`: do not edit it.",
         "",
         "[gpu.md](dev/gpu.md#how-fast-a-machine-is) says which GPUs have been measured.",
         "",

@@ -30,11 +30,11 @@ SIZE = "--width 360 --height 360 --samples 2"
 COLUMNS, STYLED = 3, "--style long_wavy"
 HEADING = """# Gallery
 
-Made by `make gallery` from the commands shown here. Do not edit this page. Each command can be
-repeated in a clone of the repository after `make setup`, and can be the start of your own:
+Hairstyles, looks, stages, kinds of hair and cards, each with the command that draws it. These
+commands work in a clone of the repository after `make setup`, and can be the start of your own:
 [command-line.md](command-line.md) explains verbs and options, [parameters.md](parameters.md) all
 that `--set` can change. Without `--width`, `--height` and `--samples`, pictures are larger and
-smoother.
+smoother. This page is made by `make gallery`: do not edit it.
 """
 
 

@@ -33,7 +33,7 @@ EXCEPTIONS = {
     "It has 2 UV maps, and hair and its shadow use the active one",
     "Scale both by 0.01 (…) or by 0.1",
     # terms at the start of a sentence, and a column of a table on the same page
-    *("Deep layers", "Occluder spheres", "Words in italics", "Allowed"),
+    *("Deep layers", "Occluder spheres", "Allowed"),
 }
 
 _CODE = re.compile(r"```.*?```|`[^`\n]*`", re.S)

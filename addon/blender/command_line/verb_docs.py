@@ -9,8 +9,9 @@ from .verb import Verb
 
 _HEADING = """# Verbs
 
-Made by `make docs` from the verbs themselves. [command-line.md](command-line.md) says how to call
-them; `VERB --help` says the same as here.
+Every verb of the command line with its options; `VERB --help` says the same.
+[command-line.md](command-line.md) says how to call them. This page is made by `make docs` from the
+verbs themselves: do not edit it.
 """
 #: titles of groups of options that many verbs share, which the page lists once
 _SHARED = ("what to work on (files, or objects of the scene)", "settings", "the job")
@@ -53,9 +54,9 @@ def _verb_lines(verb: Verb, groups: Groups) -> Iterator[str]:
 def _table(actions: list[argparse.Action]) -> Iterator[str]:
     yield from ("| Option | Meaning |", "| --- | --- |")
     for action in actions:
-        needed = " Needed." if action.required and action.option_strings else ""
+        required = " Required." if action.required and action.option_strings else ""
         meaning = (action.help or "").replace("|", "\\|")
-        yield f"| `{_usage(action)}` | {meaning}{'.' if needed else ''}{needed} |"
+        yield f"| `{_usage(action)}` | {meaning}{'.' if required else ''}{required} |"
     yield ""
 
 
