@@ -17,7 +17,7 @@ of one window climb to the same middle, two windows far apart to two. Middles fo
 moves.
 
 scale is 1 as long as less than half of the picture is bright and falls to 0 where all of it is: a
-white world throws no shafts.
+white world casts no shafts.
 
 Limitation: only what is in the picture counts, as in shafts.py.
 """
@@ -70,7 +70,7 @@ class BrightRegions:
 
 
 def wants_bright(settings: ShaftSettings) -> bool:
-    """Whether bright things throw shafts."""
+    """Whether bright things cast shafts."""
     is_wanted = settings.use_shafts and settings.source in ("bright", "both")
     return is_wanted and settings.bright_strength > 0.0
 

@@ -12,7 +12,7 @@ _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
 _FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", unmet_reason="bright alone"))
 _FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", unmet_reason="lights alone"))
 
-#: what throws shafts
+#: what casts shafts
 SOURCES = (
     ("lights", "Lights", "Lamps and suns, from their places in the picture"),
     (

@@ -187,7 +187,7 @@ class HAIRLOOM_PT_fin_bake(_FinBake, bpy.types.Panel):
 
 
 class HAIRLOOM_PT_sidebar_fin_bake(_FinBake, bpy.types.Panel):
-    """The bake of this fin"""
+    """The bake of this cloth"""
 
     bl_parent_id = "HAIRLOOM_PT_sidebar_fin"
     bl_space_type = "VIEW_3D"

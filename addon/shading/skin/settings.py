@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...params import Settings, both, integer, number, toggle, when
 
 _GREEN = "Green 2004, GPU Gems, chapter 16: texture-space diffusion"
-#: Where hair throws no shadow there is none on skin.
+#: Where hair casts no shadow there is none on skin.
 _IS_SOFT = both(
     when("skin.soft_shadow", unmet_reason="switched off"),
     when("volume.shadows", "deep", "slices", unmet_reason="needs Shadows"),

@@ -81,7 +81,7 @@ def fitted_size(
     """The size that is drawn: fewer texels per side if the size that is asked for does not fit.
 
     Args:
-        map_count: lights that throw shadows.
+        map_count: lights that cast shadows.
         max_bytes: for all maps [bytes].
         largest_side: of a texture on this GPU.
     """
