@@ -1,5 +1,7 @@
-"""Array types for annotations, comparison of arrays and their containers, indices of pieces stored
-end to end, sums and means of rows grouped by number.
+"""Array types for annotations, comparison of arrays and their containers, rows of pieces stored end
+to end, sums and means of rows grouped by number.
+
+Of pieces stored end to end, such as strands, piece p is rows offsets[p]:offsets[p + 1].
 
 Shape, unit, dtype and space of an array are documented where it is created.
 """
@@ -58,6 +60,23 @@ def number_in_piece(counts: Ints) -> Ints:
     """The index of each row within its piece, (row_count,), see `piece_starts`."""
     numbers: Ints = np.arange(counts.sum()) - np.repeat(piece_starts(counts), counts)
     return numbers
+
+
+def rows_of_ranges(first: Ints, counts: Ints) -> Ints:
+    """The rows of ranges, (n,), one range after the other, (row_count,): `counts` rows each, from
+    `first` on."""
+    rows: Ints = np.arange(counts.sum()) + np.repeat(first - piece_starts(counts), counts)
+    return rows
+
+
+def rows_of_pieces(pieces: Ints, offsets: Ints) -> Ints:
+    """The rows of some pieces, indices (n,), one piece after the other, (row_count,)."""
+    return rows_of_ranges(offsets[:-1][pieces], np.diff(offsets)[pieces])
+
+
+def pieces_of_rows(rows: Ints, offsets: Ints) -> Ints:
+    """The piece that each row is in, shaped as `rows`."""
+    return np.searchsorted(offsets, rows, side="right") - 1
 
 
 def sums_by(number: Ints, rows: Floats, count: int = 0) -> Floats:

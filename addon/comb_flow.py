@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import Floats, Ints
+from .arrays import Floats, Ints, rows_of_pieces
 from .rig_flow import GrownChildren, Rig
 from .strands import StrandSet
 from .strands.center_lines import center_lines
@@ -73,10 +73,7 @@ def _with_moved_parents(
 
 def _with_new_points(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
     """Some of the strands with new points; `points` are those of all strands."""
-    counts = strands.point_counts[chosen]
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    picked = np.arange(offsets[-1]) + np.repeat(strands.offsets[chosen] - offsets[:-1], counts)
-    return strands.take(chosen).with_points(points[picked])
+    return strands.take(chosen).with_points(points[rows_of_pieces(chosen, strands.offsets)])
 
 
 def write_children(
@@ -103,5 +100,4 @@ def _strands_of_grid(grid: Floats) -> StrandSet:
 
 def _write_strands(points: Floats, offsets: Ints, indices: Ints, strands: StrandSet) -> None:
     """Overwrite the strands of these numbers, which have the same point counts, in `points`."""
-    first = np.repeat(offsets[indices] - strands.offsets[:-1], strands.point_counts)
-    points[first + np.arange(len(strands.points))] = strands.points
+    points[rows_of_pieces(indices, offsets)] = strands.points

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, pieces_of_rows
 from ..dynamics.colliders import PosedCollider, signed_distance
 from ..dynamics.colliders.signed_distance import mesh_distance, nearer_than, poses_at_end
 from ..refine.lead_out import DEEP, Clearance, clearance_at, lead_out
@@ -68,7 +68,7 @@ class CardClearance:
         of_spines = clearance_at(spines, offsets, colliders, min_distance)
         # a row turns with the segments to both rows beside it
         rows = np.minimum(
-            row[unmeasured] + 1, offsets[1:][_cards_of_rows(row[unmeasured], offsets)] - 1
+            row[unmeasured] + 1, offsets[1:][pieces_of_rows(row[unmeasured], offsets)] - 1
         )
         of_vertices = Clearance(min_distance, distance, np.zeros(len(vertices), np.int32))
         return cls(of_spines.holding(rows, offsets), of_vertices)
@@ -138,11 +138,6 @@ class CardContacts:
             return places
 
         return lead_out(points, carry, offsets, self.colliders, clearance)[0]
-
-
-def _cards_of_rows(rows: Ints, offsets: Ints) -> Ints:
-    """Which cards rows belong to."""
-    return np.searchsorted(offsets, rows, side="right") - 1
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints, piece_starts
+from ..arrays import Floats, Ints, piece_starts, rows_of_ranges
 
 #: Maximum number of cells, whose numbers thus fit 16 bits, which numpy sorts fastest; and of rows.
 _MAX_CELLS, _MAX_ROWS = 1 << 16, 250
@@ -112,7 +112,7 @@ def _spans(grid: PointGrid, corners: Floats) -> tuple[Ints, Ints, Ints]:
     is_beside = (_corner_maximum(x) < 0) | (_corner_minimum(x) >= grid.column_count)
     rows = np.where(is_beside, 0, np.maximum(beyond - first, 0))
     triangle = np.repeat(np.arange(len(rows)), rows)
-    row = np.arange(len(triangle)) - np.repeat(piece_starts(rows) - first, rows)
+    row = rows_of_ranges(first, rows)
     left, right = _ends_in_row(x, y, triangle, row.astype(np.float32))
     begin = np.clip(left, 0, grid.column_count).astype(np.int64)
     end = np.clip(np.floor(right) + 1, 0, grid.column_count).astype(np.int64)

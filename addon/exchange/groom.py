@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, rows_of_pieces
 from ..errors import HairloomError
 from ..strands import StrandSet
 from .tfxbone import BoneWeights
@@ -94,7 +94,7 @@ class Groom:
         if self.bones is not None:
             changes["bones"] = self.bones.take(strands)
         if self.motion is not None:
-            positions = self.motion.positions[:, point_indices_of(self.strands, strands)]
+            positions = self.motion.positions[:, rows_of_pieces(strands, self.strands.offsets)]
             changes["motion"] = replace(self.motion, positions=positions)
         return replace(self, **changes)
 
@@ -174,15 +174,6 @@ class GroomMotion:
     positions: Iterable[Floats]
     rate: float
     first_frame: int = 1
-
-
-def point_indices_of(strands: StrandSet, chosen: Ints) -> Ints:
-    """Indices of the points of the chosen strands, strand after strand."""
-    counts = strands.point_counts[chosen].astype(np.int64)
-    ends = np.cumsum(counts)
-    total = int(ends[-1]) if len(ends) else 0
-    begins = strands.offsets[:-1][chosen].astype(np.int64)
-    return np.arange(total) + np.repeat(begins - (ends - counts), counts)
 
 
 def with_guide_copies(groom: Groom, guides: Ints, guide: Ints, weight: Floats) -> Groom:

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, rows_of_pieces
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
 from .files.atomic import write_error
 from .files.file_moves import move_file, unused_path
 from .files.file_names import identifier_name, name_key, unique_names
 from .files.file_set import atomic_file_set, back_up_foreign_files
-from .groom import Groom, GroomMotion, point_indices_of
+from .groom import Groom, GroomMotion
 from .groom_presets import GroomPreset, selected_strands
 from .hair_file import write_hair_file
 from .strand_export_settings import StrandExportSettings, layout_of, metres_per_unit
@@ -82,7 +82,7 @@ def _write_usd(
     layout = layout_of(USD, settings)
     strands = selected_strands(groom, layout.parts)
     if motion is not None and len(strands) < groom.strands.strand_count:
-        points = point_indices_of(groom.strands, strands)
+        points = rows_of_pieces(strands, groom.strands.offsets)
         motion = replace(motion, positions=_positions_of(motion, points))
     write_usd(
         path,

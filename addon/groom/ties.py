@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, pieces_of_rows
 from ..strands import StrandSet, Surface
 from ..strands.affine import transform_points
 from ..strands.closest_point import ClosestPointSearch
@@ -130,7 +130,7 @@ def _strands_passing(strands: StrandSet, tie: Tie) -> tuple[Ints, Floats]:
     here = begin + part[:, None] * step
     away = (here[:, : 3 if tie.is_ball else 2] ** 2).sum(axis=1)
     segment = np.flatnonzero(is_segment & (away <= 1.0))  # NaN is not
-    strand = np.searchsorted(strands.offsets, segment, side="right") - 1
+    strand = pieces_of_rows(segment, strands.offsets)
     nearness = away[segment] if tie.is_ball else segment
     order = np.lexsort((nearness, strand))
     strand, segment = strand[order], segment[order]

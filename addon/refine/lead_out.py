@@ -28,7 +28,15 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, number_in_piece, piece_starts
+from ..arrays import (
+    Bools,
+    Floats,
+    Ints,
+    number_in_piece,
+    piece_starts,
+    pieces_of_rows,
+    rows_of_pieces,
+)
 from ..dynamics.colliders import Pose, PosedCollider, signed_distance
 from ..dynamics.colliders.signed_distance import (
     are_outside_meshes,
@@ -91,7 +99,7 @@ class HeldParts:
         """
         strands = held.nonzero()[0]
         counts, last = np.diff(offsets)[strands], held[strands]
-        every = point_indices(strands, offsets)
+        every = rows_of_pieces(strands, offsets)
         is_held = number_in_piece(counts) <= np.repeat(last, counts)
         along = np.maximum.accumulate(np.where(is_held, np.cumsum(is_held) - 1, 0))
         return cls(strands, every[is_held], np.repeat(strands, last + 1), every, along)
@@ -116,7 +124,7 @@ class Clearance:
 
     def holding(self, points: Ints, offsets: Ints) -> Clearance:
         """The same, with strands moving with their roots at least up to these points (n,)."""
-        held, owner = self.held.copy(), _owners(points, offsets)
+        held, owner = self.held.copy(), pieces_of_rows(points, offsets)
         np.maximum.at(held, owner, (points - offsets[owner]).astype(np.int32))
         return Clearance(self.max_distance, _free_up_to(held, self.points, offsets), held)
 
@@ -181,7 +189,7 @@ class Deflections:
         """Bend strands, in place; segments keep their lengths. points: (point_count, 3), of all."""
         if not len(self.strands):
             return
-        counts, index = np.diff(offsets)[self.strands], point_indices(self.strands, offsets)
+        counts, index = np.diff(offsets)[self.strands], rows_of_pieces(self.strands, offsets)
         begins = piece_starts(counts)
         ridden = points[index].astype(np.float64)
         steps = _steps(ridden, begins)
@@ -213,7 +221,7 @@ class LedOut:
         cls, strands: Ints, points: Floats, offsets: Ints, deflections: Deflections = NO_DEFLECTIONS
     ) -> LedOut:
         """Take these strands from the points of all, (point_count, 3)."""
-        return cls(strands.astype(np.int32), points[point_indices(strands, offsets)], deflections)
+        return cls(strands.astype(np.int32), points[rows_of_pieces(strands, offsets)], deflections)
 
     def fits(self, offsets: Ints) -> bool:
         """Whether strands and point counts match these offsets, (strand_count + 1,)."""
@@ -224,7 +232,7 @@ class LedOut:
 
     def put(self, points: Floats, offsets: Ints) -> None:
         """Write into the points of all strands, (point_count, 3), in place."""
-        points[point_indices(self.strands, offsets)] = self.points
+        points[rows_of_pieces(self.strands, offsets)] = self.points
 
 
 NO_LED_OUT = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
@@ -249,8 +257,8 @@ def clearance_at(
 
 def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
     """The distances (point_count,), but -inf for each strand's points up to `held`."""
-    number = np.arange(len(distance)) - np.repeat(offsets[:-1], np.diff(offsets))
-    is_held = number <= np.repeat(held, np.diff(offsets))
+    counts = np.diff(offsets)
+    is_held = number_in_piece(counts) <= np.repeat(held, counts)
     return np.where(is_held, np.float32(-np.inf), distance)
 
 
@@ -285,17 +293,17 @@ def lead_out(
     """
     poses, max_distance = poses_at_end(colliders), clearance.max_distance
     held = _hold(points, carry, offsets, clearance)
-    leaning = point_indices(deflections.strands, offsets)
+    leaning = rows_of_pieces(deflections.strands, offsets)
     upright = points[leaning]
     deflections.apply_to(points, offsets)
     index, distance, outward = nearer_than(points, poses, clearance.reach)
-    owner = _owners(index, offsets)
+    owner = pieces_of_rows(index, offsets)
     away = _size(points.take(index, axis=0) - carry(index, owner))
     wanted = np.minimum(clearance.points.take(index) + away, np.float32(max_distance))
     is_near = distance < wanted - np.float32(TOLERANCE * max_distance)
     strands, first = np.unique(owner[is_near], return_index=True)
     bent = np.union1d(deflections.strands, strands)
-    every = point_indices(bent, offsets)
+    every = rows_of_pieces(bent, offsets)
     ridden = points.take(every, axis=0)
     ridden[np.searchsorted(every, leaning)] = upright
     if len(strands):
@@ -308,11 +316,6 @@ def lead_out(
     return np.union1d(held, bent), Deflections.from_points(
         bent, ridden, points.take(every, axis=0), offsets
     )
-
-
-def _owners(index: Ints, offsets: Ints) -> Ints:
-    """The strands that points belong to."""
-    return np.searchsorted(offsets, index, side="right") - 1
 
 
 def _hold(points: Floats, carry: CarryPoints, offsets: Ints, clearance: Clearance) -> Ints:
@@ -329,14 +332,6 @@ def _steps(points: Floats, begins: Ints) -> Floats:
     steps = np.diff(points, axis=0, prepend=points[:1])
     steps[begins] = 0.0
     return steps
-
-
-def point_indices(strands: Ints, offsets: Ints) -> Ints:
-    """The indices of all points of some strands, strand by strand."""
-    counts = np.diff(offsets)[strands]
-    begins = piece_starts(counts)
-    index: Ints = np.arange(counts.sum()) + np.repeat(offsets[:-1][strands] - begins, counts)
-    return index
 
 
 @cache
@@ -382,7 +377,7 @@ class _Near:
             found: the first point of each that is too near, its distance and its way out.
         """
         counts = np.diff(offsets)[strands]
-        ends, index = np.cumsum(counts), point_indices(strands, offsets)
+        ends, index = np.cumsum(counts), rows_of_pieces(strands, offsets)
         some, carried = points.take(index, axis=0), carry(index, np.repeat(strands, counts))
         wanted = clearance.points.take(index) + _size(some - carried)
         return cls(
@@ -399,7 +394,7 @@ class _Near:
     def part(self, chosen: Ints) -> _Near:
         """Some of the strands, to be led from their roots on."""
         offsets = np.append(self.begins, self.ends[-1:])
-        index, counts = point_indices(chosen, offsets), np.diff(offsets)[chosen]
+        index, counts = rows_of_pieces(chosen, offsets), np.diff(offsets)[chosen]
         ends = np.cumsum(counts)
         begins = ends - counts
         return _Near(
@@ -440,8 +435,8 @@ def _led(near: _Near, max_distance: float, poses: Sequence[Pose]) -> tuple[Float
         is_out[-1] = True
         chosen = is_out.argmax(axis=0) * len(stuck) + np.arange(len(stuck))
         shortfall[stuck] = left_over[chosen]
-        from_ = point_indices(chosen, np.append(again.begins, again.ends[-1:]))
-        led[point_indices(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
+        from_ = rows_of_pieces(chosen, np.append(again.begins, again.ends[-1:]))
+        led[rows_of_pieces(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
     is_lost = np.repeat(shortfall > max_distance, near.ends - near.begins)
     return np.where(is_lost[:, None], near.carried, led), is_lost
 

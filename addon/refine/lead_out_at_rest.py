@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, pieces_of_rows
 from ..dynamics.colliders import DistanceField, PosedCollider, signed_distance
 from ..dynamics.colliders.distance_field import MAX_UNCOVERED
 from ..dynamics.colliders.winding import winding_number
@@ -72,7 +72,7 @@ def are_inside(
         distance[outside] = np.inf
     inside = _inside(strands.points, head, distance, deep)
     found = np.zeros(strands.strand_count, bool)
-    found[np.searchsorted(strands.offsets, inside, side="right") - 1] = True
+    found[pieces_of_rows(inside, strands.offsets)] = True
     return found
 
 

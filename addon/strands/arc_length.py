@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, number_in_piece
 
 #: Points off by less than this fraction of the strand's length count as evenly spaced.
 _EVEN_TOLERANCE = 0.02
@@ -96,8 +96,7 @@ def uneven_length_fractions(points: Floats, offsets: Ints) -> Floats | None:
 def even_fractions(offsets: Ints) -> Floats:
     """`length_fractions` for evenly spaced points, (point_count,) float64."""
     counts = np.diff(offsets)
-    number = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
-    return number / np.repeat(np.maximum(counts - 1, 1), counts)
+    return number_in_piece(counts) / np.repeat(np.maximum(counts - 1, 1), counts)
 
 
 def first_point_at_arc_length(along: Floats, offsets: Ints, target: Floats) -> Ints:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, piece_starts
+from ..arrays import Bools, Floats, Ints, piece_starts, rows_of_ranges
 from ..errors import HairloomError
 from .parallel import parallel_map
 from .point_clusters import PointClusters, cluster_points
@@ -229,7 +229,7 @@ class ClosestPointSearch:
             best = _Best(self._forms.squared_distance(here, triangle), triangle)
             count, first = candidates.count[cluster], candidates.first[cluster]
             point = np.repeat(np.arange(len(here)), count)
-            pair = np.arange(len(point)) + np.repeat(first - piece_starts(count), count)
+            pair = rows_of_ranges(first, count)
             limit = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
             is_near = candidates.away[pair] <= (limit * _ROUNDING_FACTOR)[point]
             self._improve(best, here, point[is_near], candidates.triangle[pair[is_near]])

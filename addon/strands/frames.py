@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, pieces_of_rows
 from .vectors import dot_rows, unit_or
 
 #: Shortest usable normal before it is normalized, squared; shortest vector with a direction [m].
@@ -41,7 +41,7 @@ def strand_tangents(points: Floats, offsets: Ints) -> Floats:
 
 def tangents_at(points: Floats, offsets: Ints, chosen: Ints) -> Floats:
     """`strand_tangents` at the chosen ones (k,) of the points (point_count, 3), rows (3, k)."""
-    strand = np.searchsorted(offsets, chosen, side="right") - 1
+    strand = pieces_of_rows(chosen, offsets)
     after = points.take(np.minimum(chosen + 1, offsets[strand + 1] - 1), axis=0)
     after -= points.take(np.maximum(chosen - 1, offsets[strand]), axis=0)
     return _unit_or_up(np.ascontiguousarray(after.T))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, rows_of_ranges
 from .arc_length import arc_lengths, length_fractions_from, typical_length
 from .resample import positions_at, resample
 from .result_cache import NO_CACHE, ResultCache
@@ -206,7 +206,7 @@ def _rows(offsets: Ints, some: Ints) -> tuple[Ints, Ints]:
     """The offsets of some of the strands on their own, and the indices of their points."""
     counts = np.diff(offsets)[some]
     own = np.concatenate([[0], np.cumsum(counts)])
-    return own, np.arange(own[-1]) + np.repeat(offsets[:-1][some] - own[:-1], counts)
+    return own, rows_of_ranges(offsets[:-1][some], counts)
 
 
 def _refined(strands: StrandSet, count: int) -> StrandSet:

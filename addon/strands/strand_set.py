@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, rows_of_ranges
 from ..errors import HairloomError
 from .affine import mean_scale, transform_points
 from .arc_length import strand_lengths, uneven_length_fractions
@@ -149,8 +149,7 @@ class StrandSet:
         """The strands with these indices, in this order."""
         counts = self.point_counts[strands]
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
-        picked = np.repeat(self.offsets[:-1][strands], counts) + inside
+        picked = rows_of_ranges(self.offsets[:-1][strands], counts)
         per_strand: dict[str, Any] = {
             name: None if getattr(self, name) is None else getattr(self, name)[strands]
             for name in _PER_STRAND

@@ -1,4 +1,4 @@
-"""When two objects that hold arrays count as equal to the last bit."""
+"""When two objects that hold arrays count as equal to the last bit, and rows of pieces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hairloom.addon.arrays import same_content
+from hairloom.addon.arrays import (
+    pieces_of_rows,
+    rows_of_pieces,
+    rows_of_ranges,
+    same_content,
+)
 from hairloom.addon.strands import Surface
 
 
@@ -58,3 +63,12 @@ def test_what_was_found_of_it_does_not_count() -> None:
     one, other = (Surface(CORNERS, np.array([[0, 1, 2]])) for _ in range(2))
     one.vertex_normals()
     assert same_content(one, other) and same_content(other, one)
+
+
+def test_rows_of_pieces_follow_each_other() -> None:
+    """In any order, several times, and without any for a piece without rows."""
+    offsets = np.array([0, 3, 3, 5, 9], np.int32)
+    assert rows_of_pieces(np.array([3, 0, 1, 0]), offsets).tolist() == [5, 6, 7, 8, *[0, 1, 2] * 2]
+    assert rows_of_pieces(np.zeros(0, np.int64), offsets).tolist() == []
+    assert rows_of_ranges(np.array([4, 2]), np.array([2, 3])).tolist() == [4, 5, 2, 3, 4]
+    assert pieces_of_rows(np.array([0, 2, 3, 8]), offsets).tolist() == [0, 0, 2, 3]

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints, number_in_piece
+from ...arrays import Bools, Floats, Ints, rows_of_pieces
 from ...errors import HairloomError
 from ...groom.widths import with_widths
 from ...strands import StrandSet
@@ -178,12 +178,9 @@ def write_original_curves(
     """
     curves = obj.data
     offsets, moved_points = curve_offsets(curves), curve_points(curves)
-    counts = np.diff(offsets)[cleaned.curve_indices]
-    number = number_in_piece(counts)
     to_object = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
-    moved_points[np.repeat(offsets[cleaned.curve_indices], counts) + number] = transform_points(
-        points, to_object
-    )
+    kept_points = rows_of_pieces(cleaned.curve_indices, offsets)
+    moved_points[kept_points] = transform_points(points, to_object)
     move_curves(curves, moved_points)
 
 

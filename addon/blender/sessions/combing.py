@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, pieces_of_rows
 from ...errors import HairloomError
 from ...groom.roots import bind_roots
 from ...refine.lead_out_at_rest import lead_out_at_rest
@@ -74,7 +74,7 @@ def comb(
         points = points_of(bound)
         is_changed = np.zeros(count, bool)
         other = np.flatnonzero((points != bound.points).any(axis=1))
-        is_changed[np.searchsorted(bound.offsets, other, side="right") - 1] = True
+        is_changed[pieces_of_rows(other, bound.offsets)] = True
         changed, solid = np.flatnonzero(is_changed), head_field_of(surface)
         if solid is not None and len(changed):
             some = replace(bound, points=points.copy()).take(changed)

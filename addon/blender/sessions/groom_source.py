@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints, are_same
+from ...arrays import Floats, Ints, are_same, pieces_of_rows
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
@@ -310,7 +310,7 @@ class GroomSource:
         other = np.flatnonzero((strands.points != before.points).any(axis=1))
         away = np.abs(strands.points[other] - before.points[other]).max(axis=1)
         points = other[away > _ROUNDING * farthest]
-        number = np.unique(np.searchsorted(strands.offsets, points, side="right") - 1)
+        number = np.unique(pieces_of_rows(points, strands.offsets))
         if not len(number):
             return None
         self._last_curves = strands

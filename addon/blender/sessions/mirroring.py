@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints, number_in_piece
+from ...arrays import Bools, Floats, Ints, rows_of_pieces
 from ...errors import HairloomError
 from ...groom.mirror import Mirrored, mirror_sides, mirror_strands, reflection
 from ...groom.mirror_settings import MirrorSettings
@@ -118,7 +118,7 @@ def _replace(
     offsets = curve_offsets(curves)
     counts = np.diff(offsets)[source]
     curves.add_curves(counts.tolist())
-    old = np.repeat(offsets[:-1][source], counts) + _point_numbers(counts)
+    old = rows_of_pieces(source, offsets)
     new = offsets[-1] + np.arange(len(old))
     new_curves = stays.sum() + np.arange(len(source))
     for attribute in curves.attributes.values():
@@ -139,11 +139,6 @@ def _replace(
         set_attribute(curves, "surface_uv_coordinate", "CURVE", uv)
     set_points(curves, points)
     _assign_ids(curves, source, new_curves, gone)
-
-
-def _point_numbers(counts: Ints) -> Ints:
-    """The number of each point within its curve."""
-    return number_in_piece(counts)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
-from ...exchange.groom import Groom, point_indices_of, with_guide_copies
+from ...arrays import Floats, Ints, rows_of_pieces
+from ...exchange.groom import Groom, with_guide_copies
 from ...groom.painted_color import PaintedColor
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
@@ -196,7 +196,7 @@ def _export_strands(
     if rig is None or not request.guides:
         return ExportStrands(groom, groom.strands, np.zeros(0, np.int64))
     whole = with_guide_copies(groom, rig.guides, rig.weights.guide, rig.weights.weight)
-    return ExportStrands(whole, groom.strands, point_indices_of(groom.strands, rig.guides))
+    return ExportStrands(whole, groom.strands, rows_of_pieces(rig.guides, groom.strands.offsets))
 
 
 def _with_notes(

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Floats, Ints, piece_starts
+from ...arrays import Floats, Ints, piece_starts, rows_of_ranges
 from ...errors import HairloomError
 from .ball_grid import PAIR_LIMIT, BallGrid, ball_distances, ball_grid, box_of
 from .shapes import distance_from, is_solid
@@ -104,9 +104,7 @@ class SphereSetCollider:
         first = begin.take(row)
         count = begin.take(row + 1) - first
         start = piece_starts(count)  # of each point's pairs
-        ball = self._grid.ball_index.take(
-            np.arange(int(count.sum())) + np.repeat(first - start, count)
-        )
+        ball = self._grid.ball_index.take(rows_of_ranges(first, count))
         squared = np.zeros(len(ball), np.float32)
         for axis, row in enumerate(points):
             displacement = np.repeat(row, count)

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, rows_of_pieces, rows_of_ranges
 from ...errors import HairloomError
 from ...strands import StrandSet
 from ...strands.resample import arc_length_positions
 from ..files.atomic import atomic_write, check_free_space, write_error, write_failure_reason
 from ..files.file_names import identifier_name, unique_names
-from ..groom import Groom, GroomMotion, point_indices_of
+from ..groom import Groom, GroomMotion
 from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, selected_strands
 from .alembic_library import (
     alembic_library,
@@ -126,7 +126,7 @@ class _FramePoints:
 
     @classmethod
     def of(cls, part: _Part, part_strands: _PartStrands, strands: StrandSet) -> _FramePoints:
-        points = None if part.strands is None else point_indices_of(strands, part.strands)
+        points = None if part.strands is None else rows_of_pieces(part.strands, strands.offsets)
         return cls(points, part_strands.cap)
 
     def of_frame(self, frame: Floats, preset: GroomPreset) -> Floats:
@@ -328,12 +328,11 @@ def cap_points(strands: StrandSet, max_points: int) -> PointCap | None:
         return None
     new_counts = np.minimum(counts, max_points)
     offsets = np.concatenate([[0], np.cumsum(new_counts)]).astype(np.int32)
-    first = np.repeat(strands.offsets[:-1] - offsets[:-1], new_counts)
-    left = np.arange(offsets[-1]) + first
+    left = rows_of_ranges(strands.offsets[:-1], new_counts)
     right, weight = left.copy(), np.zeros(len(left), np.float32)
 
     own_left, own_weight = arc_length_positions(strands.take(long), max_points)
-    old = point_indices_of(strands, long)
+    old = rows_of_pieces(long, strands.offsets)
     places = (offsets[long][:, None] + np.arange(max_points)).ravel()
     left[places] = old[own_left.ravel()]
     right[places] = left[places] + 1

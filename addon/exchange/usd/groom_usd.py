@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, rows_of_pieces
 from ...errors import HairloomError
 from ..files.atomic import atomic_write, write_error, write_failure_reason
 from ..files.axes import from_z_up
 from ..files.file_names import identifier_name, unique_names
-from ..groom import Groom, GroomMotion, point_indices_of
+from ..groom import Groom, GroomMotion
 from .usd_library import SUFFIXES, usd_library
 from .usd_reader import error_summary
 
@@ -152,7 +152,7 @@ def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
     )
     for name, group in zip(names, numbers, strict=True):
         strands = np.flatnonzero(groom.strands.group == group)
-        yield name, _Part(point_indices_of(groom.strands, strands), groom.take(strands))
+        yield name, _Part(rows_of_pieces(strands, groom.strands.offsets), groom.take(strands))
 
 
 def _write_part(
