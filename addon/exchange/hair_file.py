@@ -114,8 +114,12 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
         source=path,
     )
     notes: tuple[str, ...] = ()
-    if (transparency != 0.0).any():
-        notes = (f"{path.name}: its transparency is not kept.",)
+    clear = int((transparency != 0.0).sum())
+    if clear:
+        notes = (
+            f"{path.name}: its transparency is not kept; {clear:,} of {len(transparency):,} points "
+            "are not opaque.",
+        )
     return ReadHairFile(
         groom,
         "",

@@ -66,10 +66,10 @@ def usable_strands(
     return cleaned
 
 
-def finite_or_zero(values: Floats, minimum: float = -np.inf) -> Floats:
-    """Values of any shape, with 0 instead of those that are not finite or less than `minimum`."""
-    is_sound = np.isfinite(values) & (values >= minimum)
-    return values if is_sound.all() else np.where(is_sound, values, np.float32(0.0))
+def finite_or_zero(values: Floats) -> Floats:
+    """Values of any shape, with 0 instead of those that are not finite."""
+    is_finite = np.isfinite(values)
+    return values if is_finite.all() else np.where(is_finite, values, np.float32(0.0))
 
 
 def values_of_kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
@@ -84,7 +84,13 @@ def values_of_kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Fl
 def unique_identities(identities: dict[str, Any], notes: list[str]) -> dict[str, Any]:
     """IDs, and attributes that refer to them; empty if strands share an ID. Adds to `notes`."""
     numbers = identities.get("strand_id")
-    if numbers is None or len(np.unique(numbers)) == len(numbers):
+    if numbers is None:
         return identities
-    notes.append("IDs were left out, because strands share them")
+    _, owners = np.unique(numbers, return_counts=True)
+    sharing = int(owners[owners > 1].sum())
+    if not sharing:
+        return identities
+    notes.append(
+        f"IDs were left out, because strands share them ({sharing:,} of {len(numbers):,} do)"
+    )
     return {}

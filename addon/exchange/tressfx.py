@@ -223,8 +223,12 @@ def _reading_notes(name: str, file: TressfxFile, color: Floats | None) -> tuple[
             f"{name}: TressFX grows {file.follow_count} follow hairs around each strand of this "
             "file, which does not contain them. Use children from guides instead."
         )
-    if color is not None and not (color[:, 3] == 1.0).all():
-        notes.append(f"{name}: the alpha of its colours is not kept.")
+    clear = 0 if color is None else int((color[:, 3] != 1.0).sum())
+    if color is not None and clear:
+        notes.append(
+            f"{name}: the alpha of its colours is not kept; {clear:,} of {len(color):,} are not "
+            "opaque."
+        )
     return tuple(notes)
 
 
@@ -234,8 +238,12 @@ def _writing_notes(
     strands, notes = groom.strands, []
     longest = int(strands.point_counts.max())
     count = len(uniform.grid[0])
-    if longest > count:
-        notes.append(f"{name}: strands of up to {longest} points were resampled to {count}.")
+    long = int((strands.point_counts > count).sum())
+    if long:
+        notes.append(
+            f"{name}: strands of up to {longest} points were resampled to {count} ({long:,} of "
+            f"{strands.strand_count:,})."
+        )
     if (strands.group != strands.group[0]).any():
         notes.append(f"{name}: .tfx holds no groups. Write a file for each group to keep them.")
     radius = uniform.radius.reshape(-1, count)

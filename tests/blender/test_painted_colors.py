@@ -448,7 +448,7 @@ def a_number(sphere: Any) -> None:
         (a_number, "no colour attribute named 'Ombre'", "Use one of: There"),
         (no_uvs, "needs a surface with UVs", "Unwrap it"),
         (no_pixels, "has no pixels", "Find its file"),
-        (not_finite, "not finite numbers", "clear its field"),
+        (not_finite, "not finite numbers (1 of ", "clear its field"),
         (unknown_space, "colour space 'ACEScg'", "sRGB"),
     ],
 )

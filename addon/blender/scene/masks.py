@@ -341,9 +341,11 @@ def checked_values(values: Floats, name: str, place: str) -> Floats:
     Raises:
         HairloomError: a value is not finite.
     """
-    if not np.isfinite(values).all():
+    broken = int((~np.isfinite(values)).sum())
+    if broken:
         raise HairloomError(
-            f"'{name}' has values that are not finite numbers, so it is not used",
+            f"'{name}' has values that are not finite numbers ({broken:,} of {values.size:,}), so "
+            "it is not used",
             place=place,
             remedy="Paint or compute it again, or clear its field",
         )

@@ -208,7 +208,9 @@ def _all_or_none(
     if len(known) == len(arrays):
         return _concatenated(known)
     if known:
-        notes.append(f"{what} were left out, which only some of its prims have")
+        notes.append(
+            f"{what} were left out, which only {len(known):,} of its {len(arrays):,} prims have"
+        )
     return None
 
 
@@ -276,7 +278,11 @@ def _identities(pieces: list[Curves], kept: Ints, notes: list[str]) -> dict[str,
     if closest is None or weights is None:
         return known
     weights = weights[kept]
-    if not np.isfinite(weights).all():
-        notes.append("closest guides were left out, because some of their weights are not numbers")
+    broken = int((~np.isfinite(weights)).sum())
+    if broken:
+        notes.append(
+            "closest guides were left out, because some of their weights are not numbers "
+            f"({broken:,} of {weights.size:,})"
+        )
         return known
     return known | {"closest_guides": closest[kept], "guide_weights": weights}

@@ -444,7 +444,24 @@ def test_primvars_that_do_not_fit_are_left_out(tmp_path: Path) -> None:
     assert groom.strands.group.tolist() == [0, 0]
     assert np.allclose(groom.strands.radius, [5e-5] * 5)
     assert "its groom_color were left out: 3 values where 'vertex' needs 5" in notes
-    assert "3 widths" in notes and "IDs were left out" in notes
+    assert (
+        "3 widths" in notes and "IDs were left out, because strands share them (2 of 2 do)" in notes
+    )
+
+
+def test_what_only_some_prims_have_is_left_out_and_counted(tmp_path: Path) -> None:
+    stage = new_stage(tmp_path / "a.usda")
+    for number in range(3):
+        curves = add_curves(stage, f"/hair_{number}", np.random.default_rng(1).random((5, 3)), [5])
+        if number:
+            uv = UsdGeom.PrimvarsAPI(curves).CreatePrimvar(
+                "groom_root_uv", Sdf.ValueTypeNames.Float2Array, "uniform"
+            )
+            uv.Set([(1, 0)])
+    stage.Save()
+    read = read_usd(tmp_path / "a.usda")
+    assert read.strands.root_uv is None
+    assert "root UVs were left out, which only 2 of its 3 prims have" in "\n".join(read.notes)
 
 
 def test_a_file_without_usable_curves_is_an_error(tmp_path: Path) -> None:
