@@ -14,7 +14,7 @@ from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
 from ..blender.base.file_names import file_paths, file_stem, given_path, in_asset_folder
-from ..blender.base.objects import without_hidden
+from ..blender.base.objects import Handle, without_hidden
 from ..blender.base.outcome import Outcome, report
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.preview.previews import previewed_rigs, previews
@@ -40,8 +40,9 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     bl_label = "Export Hair Cards"
     bl_options = {"PRESET"}
     state_after_cancel = "nothing was written"
-    #: notes on stale bakes, for the file browser
-    stale: tuple[str, ...] = ()
+    #: the hair of the file browser, and notes on its stale bake once these are shown
+    hair: Handle | None = None
+    stale: tuple[str, ...] | None = None
 
     filepath: FILE_TO_WRITE
     filter_glob: StringProperty(
@@ -99,7 +100,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
         if not self.properties.is_property_set("own_folder"):
             self.own_folder = True
-        self.stale = _stale_bake_notes(hair[:1], context.evaluated_depsgraph_get())
+        self.hair = Handle.of(hair[0]) if hair else None
         return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
@@ -198,20 +199,22 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         ends.prop(self, "last_frame", text="")
         for name in OF_MOTION[self.motion]:
             layout.prop(self, name)
+        if self.stale is None:
+            hair = None if self.hair is None else self.hair.find()
+            self.stale = _stale_bake_notes(hair, context.view_layer.depsgraph)
         for note in self.stale:
             draw_lines(layout.column(align=True), context, note, "ERROR")
 
 
 def _stale_bake_notes(
-    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+    hair: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
 ) -> tuple[str, ...]:
-    """Notes on stale bakes; a bake that cannot be read is reported when the file is written."""
+    """Notes on a stale bake; a bake that cannot be read is reported when the file is written."""
     try:
-        caches = [(each, playback.cache_of(each)) for each in hair]
-        stale = [stale_notes(each, cache, depsgraph) for each, cache in caches if cache is not None]
+        cache = None if hair is None else playback.cache_of(hair)
+        return () if hair is None or cache is None else stale_notes(hair, cache, depsgraph)
     except HairloomError:
         return ()
-    return tuple(note for notes in stale for note in notes)
 
 
 def _as_steps(writing: FileSteps[Outcome]) -> Steps[Outcome]:

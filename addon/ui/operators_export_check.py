@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 from bpy.props import EnumProperty
 
+from ..blender.base.latest_job import (
+    POLL_INTERVAL,
+    STEP_INTERVAL,
+    is_scheduled,
+    schedule,
+    unschedule,
+)
 from ..blender.base.outcome import Outcome
+from ..blender.base.redraw import redraw_file_browsers
 from ..blender.colliders.rigs import CachedRig
 from ..blender.preview.bake import is_bakeable
 from ..blender.preview.previews import previewed_rigs
@@ -19,46 +29,105 @@ from .messages import draw_lines
 from .reports import report_outcome, wait_cursor
 from .selection import needs_hair, target_hair
 
-#: the check of the file browser or popup that is open
-_check: ExportCheck | None = None
+
+@dataclass(eq=False)
+class _OpenCheck:
+    """The check of a file browser or popup that is open, and its work in the background.
+
+    window: the one in which it was opened, whose view layer it reads.
+    options: what to check for next.
+    """
+
+    check: ExportCheck
+    window: bpy.types.Window | None
+    options: tuple[StrandFormat, StrandExportSettings] | None = None
+    work: Steps[None] | None = None
+
+    def refresh_in_background(self, kind: StrandFormat, settings: StrandExportSettings) -> None:
+        """Check for a format and settings while the dialog stays responsive."""
+        self.options = kind, settings
+        if not is_scheduled(self):
+            self.work = self._steps()
+            schedule(self, self._step)
+
+    def remaining_work(self) -> Steps[None]:
+        """What is left of the work in the background, to be done now."""
+        work, self.work = self.work, None
+        unschedule(self)
+        if work is not None:
+            yield from work
+
+    def stop(self) -> None:
+        """Cancel the work in the background."""
+        work, self.work = self.work, None
+        unschedule(self)
+        if work is not None:
+            work.close()
+
+    def _steps(self) -> Steps[None]:
+        """Check for the options that were chosen last; those chosen meanwhile come next."""
+        while self.options is not None and self.check.options != self.options:
+            yield from steps_of_parts(self.check.refresh_parts(*self.options))
+
+    def _step(self) -> float | None:
+        """Continue the work; a timer of Blender's has no window of its own."""
+        assert self.work is not None
+        with (
+            nullcontext() if self.window is None else bpy.context.temp_override(window=self.window)
+        ):
+            step = next(self.work, None)
+        redraw_file_browsers()
+        if step is not None:
+            return POLL_INTERVAL if step.is_idle else STEP_INTERVAL
+        self.stop()
+        return None
+
+
+_open: _OpenCheck | None = None
 
 
 def open_check(check: ExportCheck) -> None:
     """Set the check, when a file browser or popup opens."""
-    global _check
-    _check = check
+    global _open
+    close_check()
+    _open = _OpenCheck(check, bpy.context.window)
 
 
 def close_check(check: ExportCheck | None = None) -> None:
     """Drop the check when its dialog closes, unless another one has opened since."""
-    global _check
-    if check is None or check is _check:
-        _check = None
+    global _open
+    if _open is not None and (check is None or check is _open.check):
+        _open.stop()
+        _open = None
 
 
 def cached_rigs() -> tuple[CachedRig, ...]:
     """Rigs that were made by the open dialog and by previews."""
-    return (*(() if _check is None else _check.cached_rigs), *previewed_rigs().values())
+    return (*(() if _open is None else _open.check.cached_rigs), *previewed_rigs().values())
 
 
 def hair_count() -> int:
     """The number of hair objects in the open dialog; 0 without one."""
-    return 0 if _check is None else len(_check.hair)
+    return 0 if _open is None else len(_open.check.hair)
 
 
-def refresh(context: bpy.types.Context, kind: StrandFormat, settings: StrandExportSettings) -> bool:
-    """Check for a format and settings; returns whether the result may have changed."""
-    if _check is None:
-        return False
-    with wait_cursor(context):
-        return _check.refresh(context.evaluated_depsgraph_get(), kind, settings)
+def refresh_in_background(kind: StrandFormat, settings: StrandExportSettings) -> None:
+    """Check for a format and settings while the dialog stays responsive."""
+    if _open is not None:
+        _open.refresh_in_background(kind, settings)
+
+
+def finish_refresh() -> Steps[None]:
+    """What is left of the work in the background, for an export that uses its strands."""
+    if _open is not None:
+        yield from _open.remaining_work()
 
 
 def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_bake: bool) -> None:
     """Draw what moves the hair over frames; nothing if no dialog is open."""
-    if _check is not None:
+    if _open is not None:
         column = layout.column(align=True)
-        for line in _check.motion_lines(use_bake=use_bake):
+        for line in _open.check.motion_lines(use_bake=use_bake):
             draw_lines(column, context, line)
 
 
@@ -69,18 +138,22 @@ def exportable_hair(objects: Any) -> list[bpy.types.Object]:
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> None:
     """Draw what the engine will see, below the options; nothing if no dialog is open."""
-    if _check is None:
+    if _open is None:
         return
+    check, is_busy = _open.check, _open.work is not None
     header, body = layout.panel(panel)
-    severity = "INFO" if _check.lines else "ERROR"
-    icon = severity if _check.warnings else "CHECKMARK"
-    header.label(text="What the Engine Will See", icon=icon)
+    severity = "INFO" if check.lines else "ERROR"
+    icon = severity if check.warnings else "CHECKMARK"
+    header.label(text="What the Engine Will See", icon="SORTTIME" if is_busy else icon)
     if body is None:
         return
     column = body.column(align=True)
-    for line in _check.lines:
+    column.active = not is_busy  # until then, it is of other options
+    if is_busy and check.options is None:
+        column.label(text="Reading hair")
+    for line in check.lines:
         draw_lines(column, context, line)
-    for warning in _check.warnings:
+    for warning in check.warnings:
         draw_lines(column, context, warning, severity)
 
 
@@ -92,8 +165,10 @@ def _format_and_settings(engine: str) -> tuple[StrandFormat, StrandExportSetting
 
 
 def _refresh_engine(operator: Any, context: bpy.types.Context) -> None:
-    """Check the hair for the chosen engine."""
-    refresh(context, *_format_and_settings(operator.engine))
+    """Check the hair for the chosen engine, at once: a popup is not drawn again by itself."""
+    if _open is not None:
+        with wait_cursor(context):
+            _open.check.refresh(*_format_and_settings(operator.engine))
 
 
 def _engines() -> list[tuple[str, str, str]]:
@@ -129,16 +204,11 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         check = ExportCheck.of(exportable_hair(target_hair(context)), previewed_rigs())
-        reading = check.read_steps(
-            context.evaluated_depsgraph_get(), *_format_and_settings(self.engine)
-        )
-        yield from steps_of_parts(reading)
-        open_check(check)
+        yield from steps_of_parts(check.refresh_parts(*_format_and_settings(self.engine)))
         if not bpy.app.background and self.options.is_invoke:
+            open_check(check)
             return
-        _refresh_engine(self, context)
         report_outcome(self, Outcome("; ".join(check.lines), {}, tuple(check.warnings)))
-        close_check(check)
 
     def on_finished(self, _context: bpy.types.Context) -> None:
         bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
@@ -155,7 +225,7 @@ class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """Open a popup that shows the check, with a button for the export itself."""
-        self.export_check = _check
+        self.export_check = None if _open is None else _open.check
         _refresh_engine(self, context)
         return context.window_manager.invoke_popup(self, width=440)
 

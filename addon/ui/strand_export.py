@@ -105,20 +105,24 @@ class StrandExportOperator(LongWork, ExportHelper):
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
         export_check.open_check(ExportCheck.of(hair, previewed_rigs()))
-        self._refresh(context)
+        self._refresh()
         return super().invoke(context, event)
 
     def check(self, context: bpy.types.Context) -> bool:
         """Called by Blender when an option has changed."""
-        changed = super().check(context)
-        return self._refresh(context) or changed
+        self._refresh()
+        return bool(super().check(context))
 
-    def _refresh(self, context: bpy.types.Context) -> bool:
-        return export_check.refresh(context, self.kind, settings_of(self, StrandExportSettings))
+    def _refresh(self) -> None:
+        settings = settings_of(self, StrandExportSettings)
+        export_check.refresh_in_background(self.kind, settings)
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
-        cached_rigs = export_check.cached_rigs()
-        export_check.close_check()
+        try:
+            yield from export_check.finish_refresh()
+            cached_rigs = export_check.cached_rigs()
+        finally:
+            export_check.close_check()
         plans = self._plans(context, cached_rigs)
         for done, (path, plan) in enumerate(plans):
             if done:

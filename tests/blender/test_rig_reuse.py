@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from selecting import select
 from swinging import key_x
+from waiting import run_steps_until
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import rigs
@@ -210,10 +212,10 @@ def test_hair_that_is_not_made_yet_is_made_for_the_file(
 def test_the_dialog_makes_strands_once_and_the_file_has_them(
     hair: Any, tmp_path: Path, prepared: list[str]
 ) -> None:
-    check, depsgraph = ExportCheck.of([hair]), bpy.context.evaluated_depsgraph_get()
-    check.refresh(depsgraph, TRESSFX, StrandExportSettings())
+    check = ExportCheck.of([hair])
+    check.refresh(TRESSFX, StrandExportSettings())
     assert prepared == ["Hair"]
-    check.refresh(depsgraph, ALEMBIC, StrandExportSettings())
+    check.refresh(ALEMBIC, StrandExportSettings())
     assert prepared == ["Hair"], "another format has the same strands"
     operators_export_check.open_check(check)
     exported = written(tmp_path / "found.tfx")
@@ -228,6 +230,34 @@ def test_the_dialog_makes_strands_once_and_the_file_has_them(
     assert len(prepared) == 4, "it was edited while the dialog was open"
 
 
+def test_the_dialog_reads_hair_in_the_background_and_the_file_waits_for_it(
+    hair: Any, tmp_path: Path, prepared: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepare, threads = rigs.rig_flow.prepare, list[threading.Thread]()
+
+    def noted(*arguments: Any, **named: Any) -> Any:
+        threads.append(threading.current_thread())
+        return prepare(*arguments, **named)
+
+    monkeypatch.setattr(rigs.rig_flow, "prepare", noted)
+    check, settings = ExportCheck.of([hair]), StrandExportSettings()
+    operators_export_check.open_check(check)
+    operators_export_check.refresh_in_background(TRESSFX, settings)
+    assert check.options is None and not prepared, "the file browser opens first"
+    run_steps_until(lambda: prepared == ["Hair"])
+    operators_export_check.refresh_in_background(ALEMBIC, settings)
+    assert check.options is None, "the strands are not made yet"
+    run_steps_until(lambda: check.options == (ALEMBIC, settings))
+    assert check.lines and prepared == ["Hair"]
+    assert threads and threading.main_thread() not in threads
+    operators_export_check.open_check(ExportCheck.of([hair]))
+    operators_export_check.refresh_in_background(TRESSFX, settings)
+    run_steps_until(lambda: len(prepared) == 2)
+    exported = written(tmp_path / "early.tfx")
+    assert len(prepared) == 2, "they are made once, for the dialog and the file"
+    assert exported == written(tmp_path / "own.tfx")
+
+
 def own_bytes(folder: Path) -> bytes:
     return (folder / "own.tfx").read_bytes()
 
@@ -238,8 +268,7 @@ def test_the_dialog_takes_strands_of_the_preview(
     previews.start(hair, get_depsgraph())
     prepared.clear()
     check = ExportCheck.of([hair], previews.previewed_rigs())
-    list(check.read_steps(get_depsgraph(), TRESSFX, StrandExportSettings()))
-    check.refresh(get_depsgraph(), TRESSFX, StrandExportSettings())
+    check.refresh(TRESSFX, StrandExportSettings())
     assert check.lines and not prepared
 
 

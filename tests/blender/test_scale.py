@@ -61,7 +61,7 @@ def frames_and_messages(
     check = ExportCheck.of([hair])
     warnings = {}
     for kind in STRAND_FORMATS:
-        check.refresh(get_depsgraph(), kind, StrandExportSettings())
+        check.refresh(kind, StrandExportSettings())
         warnings[kind.name] = check.warnings
     messages = {
         "warnings": warnings,

@@ -145,7 +145,7 @@ def test_motion_exports_report_stale_bakes(
 
     def line() -> str:
         check = ExportCheck.of([hair])
-        check.refresh(get_depsgraph(), ALEMBIC, StrandExportSettings())
+        check.refresh(ALEMBIC, StrandExportSettings())
         return check.motion_lines(use_bake=True)[0]
 
     assert notes() == [(), ()] and "out of date" not in line()

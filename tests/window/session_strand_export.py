@@ -65,6 +65,7 @@ def export(**options):
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         asked = bpy.ops.hairloom.export_alembic("INVOKE_DEFAULT", filepath=path, **options)
     assert asked == {"RUNNING_MODAL"}
+    assert hairloom_module("export_check")._open.check.options is None, "it is read before it opens"
     yield from wait_until(lambda: file_browser() is not None, "no file browser opens")
     yield
 
@@ -72,7 +73,8 @@ def export(**options):
 def the_check_stands_beside_the_options():
     yield from export()
     check = hairloom_module("export_check")
-    assert check.hair_count() == 1 and "guides" in check._check.lines[0], check._check
+    yield from wait_until(lambda: check._open.check.lines, "the hair is not checked")
+    assert check.hair_count() == 1 and "guides" in check._open.check.lines[0]
     driver.screenshot("options")
     yield from confirm_file_browser()
     yield from wait_until((FOLDER / "hair.abc").exists, "nothing is written")

@@ -25,9 +25,9 @@ class Outcome:
     warnings: tuple[str, ...] = ()
 
 
-def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
+def notes_of(name: str, rig: Rig) -> tuple[str, ...]:
     """The notes of a rig, each with the hair's name."""
-    return tuple(f"{hair.name}: {note}" for note in rig.notes)
+    return tuple(f"{name}: {note}" for note in rig.notes)
 
 
 def dropped_phrase(dropped: dict[str, int]) -> str:

@@ -41,6 +41,11 @@ def redraw_panels() -> None:
     _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})
 
 
+def redraw_file_browsers() -> None:
+    """Tag the options in all file browsers for a redraw."""
+    _redraw({("FILE_BROWSER", "TOOL_PROPS")})
+
+
 def refresh_panels() -> None:
     """As `redraw_panels`, but at most every half second."""
     global _last_refresh

@@ -132,7 +132,7 @@ def read_inputs(
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
     edits, doubts = read_edits(hair, depsgraph) if keep_edits else (None, ())
     inputs = CardInputs(rig, settings, pictures, occluders, edits)
-    return inputs, (*notes, *notes_of(hair, rig), *problems, *doubts), dropped
+    return inputs, (*notes, *notes_of(hair.name, rig), *problems, *doubts), dropped
 
 
 def cards_key(groom: GroomSettings) -> Hashable:

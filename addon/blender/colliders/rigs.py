@@ -72,11 +72,17 @@ class CachedRig:
         Raises:
             HairloomError: no hair that can be used.
         """
-        settings = GroomSettings.of(hair)
+        return cls.find(source, GroomSettings.of(hair), cached, hair.name)
+
+    @classmethod
+    def find(
+        cls, source: Source, settings: GroomSettings, cached: tuple[CachedRig, ...], place: str
+    ) -> CachedRig:
+        """`of`, from arrays alone."""
         for each in cached:
             if each.was_made_from(source, settings):
                 return each
-        return cls(source, settings, rig_from(source, settings.sections, place=hair.name))
+        return cls(source, settings, rig_from(source, settings.sections, place=place))
 
     def was_made_from(self, source: Source, settings: GroomSettings) -> bool:
         """Whether the rig made from these inputs is the same, to the last bit."""

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 
 import bpy
 
@@ -19,28 +17,27 @@ from ..bakes import playback
 from ..bakes.simulation import phrase_of
 from ..bakes.stale_bakes import changed_inputs
 from ..base.objects import Handle
-from ..base.parts import Part, Parts
-from ..colliders.rigs import CachedRig, rig_from
-from ..properties.groom_settings import GroomSettings
-from ..scene.source import read_source
-from .read_hair import ExportRequest, needs_rig, read_still_hair
+from ..base.parts import Part, Parts, run_parts
+from ..colliders.rigs import CachedRig
+from .read_hair import ExportRequest, still_hair_parts
 from .strand_export import StrandExport, request_of
 
 
 @dataclass
 class ExportCheck:
-    """Hair that is read once, when the dialog opens, and checked for each choice of settings.
+    """Hair that is read once for its dialog, and checked for each choice of settings.
 
     lines: what the file will contain. warnings: for the artist.
+    options: what these are for; None: nothing was checked yet.
     """
 
     hair: list[Handle]
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    options: tuple[StrandFormat, StrandExportSettings] | None = None
     _grooms: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
     _cached_rigs: dict[int, CachedRig] = field(default_factory=dict)
     _changed_inputs: dict[int, tuple[str, ...]] = field(default_factory=dict)
-    _last_options: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
     def of(
@@ -61,67 +58,46 @@ class ExportCheck:
         """The rigs that were made, so that writing the file need not make them again."""
         return tuple(self._cached_rigs.values())
 
-    def read_steps(
-        self,
-        depsgraph: bpy.types.Depsgraph,
-        kind: StrandFormat,
-        settings: StrandExportSettings,
-    ) -> Parts[None]:
-        """The slow part of the first `refresh`, and of one for another format."""
-        request = request_of(kind, settings)
-        for hair in filter(None, [each.find() for each in self.hair]):
-            uid, name = hair.session_uid, hair.name
-            if not needs_rig(hair, request):
-                continue
-            groom = GroomSettings.of(hair)
-            with suppress(HairloomError):  # `refresh` gets it too, and reports it
-                source = read_source(hair, depsgraph)
-                cached = self._cached_rigs.get(uid)
-                if cached is None or not cached.was_made_from(source, groom):
-                    make = partial(rig_from, source, groom.sections, place=name)
-                    rig = yield Part("Making strands", make)
-                    self._cached_rigs[uid] = CachedRig(source, groom, rig)
+    def refresh(self, kind: StrandFormat, settings: StrandExportSettings) -> None:
+        """Check for a format and settings."""
+        run_parts(self.refresh_parts(kind, settings))
 
-    def refresh(
-        self,
-        depsgraph: bpy.types.Depsgraph,
-        kind: StrandFormat,
-        settings: StrandExportSettings,
-    ) -> bool:
-        """Check for a format and settings; returns whether the result may have changed."""
-        if self._last_options == (kind, settings):
-            return False
-        if self._last_options is None:
-            self._find_stale_bakes(depsgraph)
+    def refresh_parts(self, kind: StrandFormat, settings: StrandExportSettings) -> Parts[None]:
+        """`refresh` in parts, between which the scene may change."""
+        if self.options == (kind, settings):
+            return
+        if self.options is None:
+            self._find_stale_bakes()
         try:
-            groom, notes = self._groom(depsgraph, request_of(kind, settings))
-            facts = StrandExport(groom, settings, kind).check()
+            groom, notes = yield from self._groom_parts(request_of(kind, settings))
+            facts = yield Part("Checking", StrandExport(groom, settings, kind).check)
         except HairloomError as error:
             self.lines, self.warnings = [], [str(error)]
         else:
             self.lines, self.warnings = check_lines(facts), [*notes, *facts["warnings"]]
-        self._last_options = kind, settings
-        return True
+        self.options = kind, settings
 
     def motion_lines(self, *, use_bake: bool) -> list[str]:
         """The source of motion of each hair, when frames are written."""
         hair = filter(None, (each.find() for each in self.hair))
         return [f"{each.name}: {self._motion_source(each, use_bake)}" for each in hair]
 
-    def _groom(
-        self, depsgraph: bpy.types.Depsgraph, request: ExportRequest
-    ) -> tuple[Groom, tuple[str, ...]]:
+    def _groom_parts(self, request: ExportRequest) -> Parts[tuple[Groom, tuple[str, ...]]]:
         if request not in self._grooms:
-            found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
-            if not found:
-                raise HairloomError("it is gone", place="hair", remedy="Export again")
-            exports = [
-                read_still_hair(each, depsgraph, request, self.cached_rigs) for each in found
-            ]
-            for each, export in zip(found, exports, strict=True):
+            exports = []
+            for handle in self.hair:
+                hair = handle.find()
+                if hair is None:
+                    continue
+                depsgraph = bpy.context.evaluated_depsgraph_get()
+                export = yield from still_hair_parts(hair, depsgraph, request, self.cached_rigs)
                 if export.cached_rig is not None:
-                    self._cached_rigs[each.session_uid] = export.cached_rig
-            groom, lost = join_grooms([export.groom for export in exports], found[0].name)
+                    self._cached_rigs[handle.uid] = export.cached_rig
+                exports.append(export)
+            if not exports:
+                raise HairloomError("it is gone", place="hair", remedy="Export again")
+            grooms = [export.groom for export in exports]
+            groom, lost = join_grooms(grooms, grooms[0].name)
             notes = dict.fromkeys([note for export in exports for note in export.notes])
             self._grooms[request] = groom, (*notes, *lost)
         return self._grooms[request]
@@ -138,8 +114,9 @@ class ExportCheck:
         changed = self._changed_inputs.get(hair.session_uid, ())
         return f"{line}, out of date ({phrase_of(changed)})" if changed else line
 
-    def _find_stale_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def _find_stale_bakes(self) -> None:
         """Find stale bakes, once: hashing all inputs of a bake is too slow for drawing."""
+        depsgraph = bpy.context.evaluated_depsgraph_get()
         for hair in filter(None, (each.find() for each in self.hair)):
             try:
                 cache = playback.cache_of(hair)

@@ -138,7 +138,11 @@ def _add_real_hair(hair: bpy.types.Object, drawn: _DrawnHair) -> RealHair:
         real.data, real_look(settings[ShadingSettings]), has_final_colors=True
     )
     result = f"Made {strands.strand_count:,} strands real: {real.name}"
-    warnings = [*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes)]
+    warnings = [
+        *source.warnings,
+        *notes_of(hair.name, rig),
+        *(f"{real.name}: {each}" for each in notes),
+    ]
     if hair.is_editable:
         _hide(hair)
         result += f". {hair.name} is hidden"

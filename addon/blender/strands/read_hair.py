@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -11,9 +12,12 @@ import numpy as np
 
 from ...arrays import Floats, Ints, rows_of_pieces
 from ...exchange.groom import Groom, with_guide_copies
+from ...groom.children_settings import ChildrenSettings
 from ...groom.painted_color import PaintedColor
 from ...groom.roots import bind_roots
+from ...groom.settings import GuideSettings
 from ...groom.weights import guide_weights
+from ...groom.width_settings import WidthSettings
 from ...groom.widths import with_widths, with_widths_of
 from ...paint_flow import with_colors
 from ...rig_flow import Rig
@@ -25,6 +29,7 @@ from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..base.outcome import notes_of
+from ..base.parts import Part, Parts, run_parts
 from ..colliders.rigs import CachedRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
@@ -78,11 +83,6 @@ class ExportStrands:
         )
 
 
-def needs_rig(hair: bpy.types.Object, request: ExportRequest) -> bool:
-    """Whether `read_still_hair` may have to make a rig, which is slow."""
-    return hair.data.hairloom.children.method != "none" or request.guides
-
-
 def read_still_hair(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
@@ -100,36 +100,64 @@ def read_still_hair(
     Raises:
         HairloomError: no usable hair, or it is of another scale than its head.
     """
-    source = read_source(hair, depsgraph)
-    has_children = hair.data.hairloom.children.method != "none"
-    cached_rig = CachedRig.of(hair, source, cached_rigs) if has_children else None
+    return run_parts(still_hair_parts(hair, depsgraph, request, cached_rigs))
+
+
+def still_hair_parts(
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    request: ExportRequest,
+    cached_rigs: tuple[CachedRig, ...] = (),
+) -> Parts[ExportStrands]:
+    """`read_still_hair` in two steps: the scene is read, then a part makes the strands."""
+    source, settings = read_source(hair, depsgraph), GroomSettings.of(hair)
+    stored = stored_groom(hair, depsgraph, source.curve_indices)
+    make = partial(_still_strands, hair.name, source, settings, stored, request, cached_rigs)
+    export: ExportStrands = yield Part("Making strands", make)
+    return export
+
+
+def _still_strands(
+    name: str,
+    source: Source,
+    settings: GroomSettings,
+    stored: dict[str, Any],
+    request: ExportRequest,
+    cached_rigs: tuple[CachedRig, ...],
+) -> ExportStrands:
+    """The strands of hair that was read, from arrays alone.
+
+    Args:
+        stored: see `stored_groom`.
+    """
+    look = settings[ShadingSettings]
+    has_children = settings[ChildrenSettings].method != "none"
+    cached_rig = CachedRig.find(source, settings, cached_rigs, name) if has_children else None
     if cached_rig is not None and cached_rig.rig.own_count is not None:
         rig = cached_rig.rig
-        strands = with_colors(rig.strands, source.colors, _look(hair))
-        groom = Groom(strands, hair.name, group_names=group_names(hair))
+        strands = with_colors(rig.strands, source.colors, look)
+        groom = Groom(strands, name, group_names=stored["group_names"])
         export = replace(
-            _export_strands(groom, rig, request, _look(hair)),
-            cached_rig=cached_rig,
-            has_children=True,
+            _export_strands(groom, rig, request, look), cached_rig=cached_rig, has_children=True
         )
-        return _with_notes(hair, source, export, rig)
-    attributes = _without_empty_marks(stored_groom(hair, depsgraph, source.curve_indices))
+        return _with_notes(name, source, export, rig)
+    attributes = _without_empty_marks(stored)
+    strands = _as_wide_as_drawn(settings, source.strands)
     if request.guides and "is_guide" not in attributes:
-        cached_rig = cached_rig or CachedRig.of(hair, source, cached_rigs)
-        rig, strands = cached_rig.rig, _as_wide_as_drawn(hair, source.strands)
-        strands = with_colors(_with_roots_of(strands, rig.strands), source.colors, _look(hair))
-        groom = Groom(strands, hair.name, **attributes)
-        export = replace(_export_strands(groom, rig, request, _look(hair)), cached_rig=cached_rig)
-        return _with_notes(hair, source, export, rig)
-    strands = _as_wide_as_drawn(hair, source.strands)
+        cached_rig = cached_rig or CachedRig.find(source, settings, cached_rigs, name)
+        rig = cached_rig.rig
+        strands = with_colors(_with_roots_of(strands, rig.strands), source.colors, look)
+        groom = Groom(strands, name, **attributes)
+        export = replace(_export_strands(groom, rig, request, look), cached_rig=cached_rig)
+        return _with_notes(name, source, export, rig)
     needs_roots = request.roots or strands.root_uv is None or source.colors is not None
     if source.head is not None and needs_roots:
-        strands = bind_roots(strands, source.head, place=hair.name).strands
-    strands = with_colors(strands, source.colors, _look(hair))
-    groom = Groom(strands, hair.name, **attributes)
+        strands = bind_roots(strands, source.head, place=name).strands
+    strands = with_colors(strands, source.colors, look)
+    groom = Groom(strands, name, **attributes)
     if request.guides and groom.closest_guides is None:
-        groom = _with_guide_weights(groom, hair.data.hairloom.guides.cv_count)
-    return _with_notes(hair, source, _export_strands(groom, None, request, _look(hair)))
+        groom = _with_guide_weights(groom, settings[GuideSettings].cv_count)
+    return _with_notes(name, source, _export_strands(groom, None, request, look))
 
 
 def read_baked_hair(
@@ -200,16 +228,15 @@ def _export_strands(
 
 
 def _with_notes(
-    hair: bpy.types.Object, source: Source, export: ExportStrands, rig: Rig | None = None
+    name: str, source: Source, export: ExportStrands, rig: Rig | None = None
 ) -> ExportStrands:
-    notes = () if rig is None else notes_of(hair, rig)
+    notes = () if rig is None else notes_of(name, rig)
     return replace(export, dropped=source.dropped, notes=(*source.warnings, *notes))
 
 
-def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
-    settings = hair.data.hairloom
-    drawn = with_needed_points(strands, settings.guides.cv_count)
-    drawn, widths = with_widths(drawn, settings.widths.method)
+def _as_wide_as_drawn(settings: GroomSettings, strands: StrandSet) -> StrandSet:
+    drawn = with_needed_points(strands, settings[GuideSettings].cv_count)
+    drawn, widths = with_widths(drawn, settings[WidthSettings].method)
     return with_widths_of(strands, drawn) if widths.is_found else strands
 
 
