@@ -21,6 +21,7 @@ from ..blender.preview.previews import previewed_rigs, previews
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..cards.export_settings import OF_MOTION, CardExportSettings
+from ..cards.settings import CardSettings
 from ..errors import HairloomError
 from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
 from .drawing import draw_inactive
@@ -30,6 +31,8 @@ from .messages import draw_lines
 from .reports import report_outcome
 from .selection import needs_hair, target_hair
 
+#: the setting of the groom that the dialog's own number of levels overrides
+(_LEVELS,) = (each for each in CardSettings.parameters() if each.name == "levels")
 _FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
 
 
@@ -71,15 +74,15 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         description="Number of meshes to write, each with about half the triangles of the "
         "previous one",
         default=3,
-        min=1,
-        max=5,
+        soft_min=1,
+        soft_max=5,
     )
     own_frames: BoolProperty(
         name="Other Frames", description="Write only part of the bake", default=False
     )
     first_frame: IntProperty(name="First", description="First frame to write", default=1)
     last_frame: IntProperty(name="Last", description="Last frame to write", default=250)
-    __annotations__ |= operator_properties("cards_export")
+    __annotations__ |= operator_properties("cards_export", clamps=False)
 
     @property
     def filename_ext(self) -> str:
@@ -123,7 +126,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             context.evaluated_depsgraph_get(),
             path,
             self._output(path, hair.name),
-            levels=self.levels if self.own_levels else None,
+            levels=self._levels(),
             frames=self._frames(hair),
             cached_rigs=tuple(previewed_rigs().values()),
             cache=previews.built_cards,
@@ -134,6 +137,11 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         is_known = path.suffix.lower() in SUFFIXES
         settings = settings_of(self, CardExportSettings)
         return CardOutput(None if is_known else self.format, file_stem(hair_name), settings)
+
+    def _levels(self) -> int | None:
+        if not self.own_levels:
+            return None
+        return int(_LEVELS.checked(self.levels, self.bl_label, name="Levels"))
 
     def _frames(self, hair: bpy.types.Object) -> range | None:
         if not self.own_frames or self.motion == "none":

@@ -22,6 +22,7 @@ from ..blender.colliders.rigs import CachedRig
 from ..blender.preview.bake import is_bakeable
 from ..blender.preview.previews import previewed_rigs
 from ..blender.strands.export_check import ExportCheck
+from ..errors import HairloomError
 from ..exchange.strand_export_settings import StrandExportSettings
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
 from .long_work import LongWork, Steps, steps_of_parts
@@ -115,6 +116,14 @@ def refresh_in_background(kind: StrandFormat, settings: StrandExportSettings) ->
     """Check for a format and settings while the dialog stays responsive."""
     if _open is not None:
         _open.refresh_in_background(kind, settings)
+
+
+def show_error(error: HairloomError) -> None:
+    """Show why these settings cannot be used."""
+    if _open is not None:
+        _open.stop()
+        check = _open.check
+        check.lines, check.warnings, check.options = [], [str(error)], None
 
 
 def finish_refresh() -> Steps[None]:

@@ -46,7 +46,8 @@ _DIALOG_OPTIONS = {"Include": ("several",), "Animation": ("frames", "first", "la
 
 def option_properties(kind: StrandFormat) -> dict[str, Any]:
     """The options in the `__annotations__` of the operator that writes a format."""
-    return property_annotations(_for_format(kind, each) for each in _options(kind))
+    options = (_for_format(kind, each) for each in _options(kind))
+    return property_annotations(options, clamps=False)
 
 
 def _for_format(kind: StrandFormat, option: Parameter) -> Parameter:
@@ -114,8 +115,12 @@ class StrandExportOperator(LongWork, ExportHelper):
         return bool(super().check(context))
 
     def _refresh(self) -> None:
-        settings = settings_of(self, StrandExportSettings)
-        export_check.refresh_in_background(self.kind, settings)
+        try:
+            settings = settings_of(self, StrandExportSettings)
+        except HairloomError as error:
+            export_check.show_error(error)
+        else:
+            export_check.refresh_in_background(self.kind, settings)
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         try:

@@ -1,6 +1,8 @@
 """Scripts call operators with whatever is at hand: each call works, or its error is a sentence of
 ours and the scene is as it was before."""
 
+import re
+
 import bpy
 import pytest
 from tiers import few_in_commits
@@ -113,6 +115,24 @@ def test_an_export_names_the_operator_and_the_label_of_a_value_that_cannot_be_us
     select(new_hair())
     with pytest.raises(RuntimeError, match=r"Error: Export Cem Yuksel's \.hair: 'Scale' is nan"):
         bpy.ops.hairloom.export_hair(filepath="hair.hair", scale=float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("usd", {"filepath": "a.usdc", "scale": -1.0}, "'Scale' is -1.0, .* from 0 to 1e"),
+        ("hair", {"filepath": "a.hair", "scale": 1.0e7}, "'Scale' is 1.*, .* from 0 to 1e"),
+        ("tressfx", {"filepath": "a.tfx", "held_count": 9}, "'Held Vertices' is 9, .* 0 to 8"),
+        ("cards", {"filepath": "a.glb", "joints": 1}, "'Joints' is 1, .* from 2 to 16"),
+        ("cards", {"filepath": "a.glb", "own_levels": True, "levels": 6}, "'Levels' is 6, .* to 5"),
+    ],
+)
+def test_an_export_refuses_a_number_out_of_range(name, values, message, new_hair):
+    """Blender itself would use the nearest valid number, without a word."""
+    select(new_hair())
+    label = getattr(bpy.ops.hairloom, f"export_{name}").get_rna_type().name
+    with pytest.raises(RuntimeError, match=f"Error: {re.escape(label)}: {message}"):
+        getattr(bpy.ops.hairloom, f"export_{name}")(**values)
 
 
 def properties():

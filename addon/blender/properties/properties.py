@@ -64,10 +64,15 @@ def property_group(settings: type[Settings], changed: Changed | None = None) -> 
 
 
 def property_annotations(
-    parameters: Iterable[Parameter], changed: Changed | None = None
+    parameters: Iterable[Parameter], changed: Changed | None = None, *, clamps: bool = True
 ) -> dict[str, Any]:
-    """name -> Blender property, for the `__annotations__` of a group or an operator."""
-    return {each.name: _property(each, changed) for each in parameters}
+    """name -> Blender property, for the `__annotations__` of a group or an operator.
+
+    Args:
+        clamps: whether Blender silently uses the nearest valid number for one that is out of
+            range; if not, `settings_of` refuses it.
+    """
+    return {each.name: _property(each, changed, clamps) for each in parameters}
 
 
 def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
@@ -144,7 +149,7 @@ def matching_weights(obj: bpy.types.Object | None, text: str) -> list[str]:
     return [name for name in names if text.lower() in name.lower()]
 
 
-def _property(parameter: Parameter, changed: Changed | None) -> Any:
+def _property(parameter: Parameter, changed: Changed | None, clamps: bool) -> Any:
     common: dict[str, Any] = {
         "name": parameter.label,
         "description": parameter.description,
@@ -161,7 +166,7 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
     if parameter.kind in _SEARCHES:
         search = _SEARCHES[parameter.kind]
         return StringProperty(search=search, **common | {"options": set()})
-    common |= _ranges(parameter)
+    common |= _ranges(parameter, clamps)
     if parameter.kind == "integer":
         return IntProperty(**common)
     if parameter.kind == "color":
@@ -184,9 +189,10 @@ def _precision(parameter: Parameter) -> int:
     return next(precise, shown)
 
 
-def _ranges(parameter: Parameter) -> dict[str, float]:
+def _ranges(parameter: Parameter, clamps: bool) -> dict[str, float]:
     limits: dict[str, float] = {}
-    for prefix, span in (("", parameter.hard_range), ("soft_", parameter.soft_range)):
+    hard = parameter.hard_range if clamps else None
+    for prefix, span in (("", hard), ("soft_", parameter.soft_range)):
         if span is None:
             continue
         low, high = span
