@@ -7,7 +7,6 @@ from typing import ClassVar
 import bpy
 
 from ..blender.bakes import playback
-from ..blender.bakes.simulation import phrase_of
 from ..blender.base.outcome import report
 from ..blender.preview import previews
 from ..blender.preview.bake import Bake, free, is_bakeable, show_in_renders
@@ -122,6 +121,33 @@ def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     _draw_state(layout, obj)
 
 
+def _inputs(changed: tuple[str, ...]) -> str:
+    """The names of inputs of a bake, see `simulation.differences`."""
+    texts = {
+        "hair": translated("combed or edited hair"),
+        "head": translated("head"),
+        "guides": translated("guides"),
+        "widths": translated("widths"),
+        "children": translated("children"),
+        "partings": translated("partings"),
+        "ties": translated("hair ties"),
+        "style": translated("style"),
+        "paint": translated("masks"),
+        "other grooms": translated("other hair"),
+        "mesh": translated("mesh"),
+        "pins": translated("pins"),
+        "colliders": translated("colliders"),
+        "frame rate": translated("frame rate"),
+        "solver": translated("solver"),
+        "pose": translated("pose"),
+        "settings": translated("settings"),
+        "selection": translated("selection"),
+        "forces": translated("forces"),
+        "what it was made from": translated("what it was made from"),
+    }
+    return ", ".join(texts.get(each, each) for each in changed)
+
+
 def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     try:
         cache, problem = playback.cache_of(obj), ""
@@ -154,7 +180,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         draw_figures(layout.column(align=True), table_of(figures))
     preview_bake = previews.bake_of(obj)
     changed = () if facts is None or preview_bake is None else preview_bake.changed_inputs
-    text = translated("Changed since: {inputs}", inputs=phrase_of(changed)) if changed else ""
+    text = translated("Changed since: {inputs}", inputs=_inputs(changed)) if changed else ""
     layout.label(text=text, icon="ERROR" if changed else "BLANK1", translate=False)
 
 

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.strands.growing import grow_again, grow_on, has_grown, is_outdated, lost_by_regrowing
+from ..blender.strands.growing import (
+    COMBED_SHAPE,
+    grow_again,
+    grow_on,
+    has_grown,
+    is_outdated,
+    lost_by_regrowing,
+)
 from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_settings_hint
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
@@ -81,7 +88,7 @@ def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     lines = layout.column(align=True)
     icon = "UNLOCKED" if not lost else "LOCKED"
     lines.label(text=_state(curves, lost), icon=icon, translate=False)
-    loses = translated("Growing again loses: {lost}", lost=_listed(lost))
+    loses = translated("Growing again loses: {lost}", lost=_listed(curves, lost))
     lines.label(text=loses, icon="BLANK1", translate=False)
     if not draw_progress(lines, HAIRLOOM_OT_grow_again):
         button = lines.row()
@@ -105,11 +112,16 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
     return translated("Changed since it grew")
 
 
-def _listed(lost: tuple[str, ...]) -> str:
+def _listed(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
     """The names, or the number of them if they would not fit in a line."""
-    if len(lost) > _MAX_LISTED:
-        return f"{lost[0]}, {len(lost) - 1} attributes"
-    return ", ".join(lost) or "nothing"
+    if not lost:
+        return translated("nothing")
+    if not has_grown(curves):
+        return translated("{count:,} curves", count=len(curves.curves))
+    names = [translated("combed shape") if each == COMBED_SHAPE else each for each in lost]
+    if len(names) > _MAX_LISTED:
+        return f"{names[0]}, {translated('{count:,} attributes', count=len(names) - 1)}"
+    return ", ".join(names)
 
 
 CLASSES = (HAIRLOOM_OT_grow, HAIRLOOM_OT_grow_again)

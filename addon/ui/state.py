@@ -101,10 +101,25 @@ def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> b
         return False
     row = layout.row(align=True)
     stage = session.cards.stage
-    text = translated("Cards: {stage}", stage=stage) if stage else translated("Cards: waiting")
+    named = translated("Cards: {stage}", stage=_card_stage(stage))
+    text = named if stage else translated("Cards: waiting")
     row.label(text=text, icon="SORTTIME", translate=False)
     row.operator("hairloom.cancel_build", text="", icon="X")
     return True
+
+
+def _card_stage(stage: str) -> str:
+    """The name of a stage of building cards."""
+    texts = {
+        "Other hair": translated("Other hair"),
+        "Cards from strands": translated("Cards from strands"),
+        "Shells from strands": translated("Shells from strands"),
+        "Levels of detail": translated("Levels of detail"),
+        "Atlas": translated("Atlas"),
+        "Check of the order": translated("Check of the order"),
+        "Textures": translated("Textures"),
+    }
+    return texts.get(stage, stage)
 
 
 def _statistics(session: Session | None) -> Iterator[Statistic]:

@@ -1,5 +1,7 @@
 """Translatable texts are all in the template, and a language file reaches Blender."""
 
+import ast
+import inspect
 import json
 import re
 
@@ -9,10 +11,22 @@ from panel_layout import Layout
 
 import hairloom
 from hairloom.addon import registration
+from hairloom.addon.blender.bakes import groom_hashes
+from hairloom.addon.blender.cards import build as blender_card_build
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.properties import TRANSLATION_CONTEXT
-from hairloom.addon.ui import preset_chooser, state, texts, translations
+from hairloom.addon.blender.sessions import fins as session_fins
+from hairloom.addon.blender.strands import growing
+from hairloom.addon.cards import build as card_build
+from hairloom.addon.ui import (
+    operators_bake,
+    operators_grow,
+    preset_chooser,
+    state,
+    texts,
+    translations,
+)
 
 #: context -> texts of operators and settings
 DECLARED = {
@@ -83,6 +97,43 @@ def test_state_counts_and_names_of_presets_are_in_the_language(language, new_hai
     for section in preset_chooser.KINDS:
         for entry in presets.shipped_presets(section):
             assert (TRANSLATION_CONTEXT, entry.title) in table
+
+
+@pytest.mark.parametrize("language", translations.tables())
+def test_names_within_a_translated_line_are_in_the_language(language, new_hair, monkeypatch):
+    """Stages of building cards, inputs of a bake, and what growing again loses."""
+    table = translations.tables()[language]
+    monkeypatch.setattr(texts, "pgettext_iface", lambda text, context: table[context, text] + "!")
+    for stage in stages_of_cards():
+        assert state._card_stage(stage).endswith("!"), stage
+    for name in inputs_of_bakes():
+        assert operators_bake._inputs((name,)).endswith("!"), name
+    curves = new_hair().data
+    assert operators_grow._listed(curves, ()).endswith("!")
+    assert operators_grow._listed(curves, growing.lost_by_regrowing(curves)).endswith("!")
+    curves.hairloom.grow.shape = "another"
+    combed = growing.lost_by_regrowing(curves)[0]
+    assert operators_grow._listed(curves, (combed,)).endswith("!")
+    assert operators_grow._listed(curves, (combed, "a", "b")).count("!") == 2
+
+
+def stages_of_cards():
+    """The texts that building cards yields and reports."""
+    code = inspect.getsource(card_build) + inspect.getsource(blender_card_build)
+    stages = re.findall(r'(?:yield |work\.report\()"([^"]+)"', code)
+    assert len(stages) >= 8, stages
+    return stages
+
+
+def inputs_of_bakes():
+    """The names of the parts of rig hashes and frame hashes."""
+    names = {*groom_hashes.RIG_PARTS, "other_grooms", "selection"}
+    for module in (groom_hashes, session_fins):
+        for node in ast.walk(ast.parse(inspect.getsource(module))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "hashes":
+                names |= {each.arg for each in node.keywords if each.arg}
+    assert {"pins", "forces", "solver"} < names
+    return [name.replace("_", " ") for name in names - {"groom"}]
 
 
 def test_a_language_reaches_blender_and_goes_again(no_extension, monkeypatch, tmp_path):

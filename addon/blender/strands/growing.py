@@ -35,6 +35,8 @@ from ..scene.surfaces import read_surface
 
 #: attributes of hair as it grows
 _GROWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
+#: what growing again loses of the grown curves themselves
+COMBED_SHAPE = "combed shape"
 
 
 def grow_on(
@@ -157,7 +159,7 @@ def lost_by_regrowing(curves: bpy.types.Curves) -> tuple[str, ...]:
     if not growth.shape:
         return (f"{len(curves.curves):,} curves",) if len(curves.curves) else ()
     is_combed = growth.shape != _shape_digest(curves)
-    return (*(("combed shape",) if is_combed else ()), *_other_attributes(curves))
+    return (*((COMBED_SHAPE,) if is_combed else ()), *_other_attributes(curves))
 
 
 def has_grown(curves: bpy.types.Curves) -> bool:
