@@ -16,6 +16,7 @@ import pytest
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs
+from hairloom.addon.blender.scene.mesh_files import import_mesh_file, read_mesh_file
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom
@@ -154,6 +155,16 @@ def test_an_unusable_head_is_named(
     assert command_line.run(arguments) == 1
     assert problem in capfd.readouterr().err
     assert not output.exists()
+
+
+def test_missing_materials_of_a_head_are_one_note(tmp_path: Path) -> None:
+    head = tmp_path / "head.obj"
+    head.write_text(f"mtllib skin.mtl\n{HEAD_OBJ}")
+    note = "head.obj: its materials are plain, as skin.mtl is missing. Put it beside head.obj"
+    assert read_mesh_file(head, need_uv=False)[1] == (note,)
+    assert import_mesh_file(head)[1] == (note,)
+    (tmp_path / "skin.mtl").write_text("newmtl skin\n")
+    assert read_mesh_file(head, need_uv=False)[1] == ()
 
 
 def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:

@@ -234,6 +234,11 @@ def test_files_that_a_head_refers_to_are_inputs(extension: None, tmp_path: Path)
     assert Stamp(options).reason_to_run() == ""
     (tmp_path / "skin.mtl").write_text("newmtl other\n")
     assert Stamp(options).reason_to_run() == "skin.mtl has changed"
+    (tmp_path / "skin.mtl").unlink()
+    Stamp(options).write(report)
+    assert Stamp(options).reason_to_run() == ""
+    (tmp_path / "skin.mtl").write_text("newmtl skin\n")
+    assert Stamp(options).reason_to_run() == "skin.mtl has changed", "it was missing"
 
 
 def test_files_that_blender_brings_along_are_no_inputs(

@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...errors import HairloomError
+from ...exchange.referenced_files import missing_materials
 from ...exchange.usd.usd_crate import CRATE, check_crate
 from ...strands import Surface
 from ..base.parts import new_blocks_removed, new_blocks_removed_on_error
@@ -41,7 +42,7 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ..
     with meshes_of_file(path) as meshes:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
-        notes = tuple(filter(None, map(uv_map_note, meshes)))
+        notes = (*filter(None, map(uv_map_note, meshes)), *_missing_notes(path))
     return merged_surfaces(parts), notes
 
 
@@ -68,15 +69,11 @@ def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, 
     names = [each.name for each in meshes]
     bpy.context.view_layer.update()
     mesh = max(meshes, key=lambda each: max(each.dimensions))  # the joined mesh has its name
-    notes: tuple[str, ...] = ()
+    notes = _missing_notes(path)
     if len(meshes) > 1:
         _join(mesh, meshes)
-        notes = (
-            (
-                f"{path.name}: its {len(names)} meshes ({', '.join(names)}) were joined into "
-                f"{mesh.name}"
-            ),
-        )
+        joined = f"its {len(names)} meshes ({', '.join(names)}) were joined into {mesh.name}"
+        notes = (f"{path.name}: {joined}", *notes)
     if scale != 1.0:
         scale_object(mesh, scale)
     return mesh, notes
@@ -142,6 +139,16 @@ def _check_before_reading(path: Path) -> None:
         raise _unreadable(path, error.strerror or str(error)) from error
     if beginning == CRATE:
         check_crate(path)
+
+
+def _missing_notes(path: Path) -> tuple[str, ...]:
+    """A note on material files that are missing."""
+    missing = ", ".join(missing_materials(path))
+    if not missing:
+        return ()
+    return (
+        f"{path.name}: its materials are plain, as {missing} is missing. Put it beside {path.name}",
+    )
 
 
 def merged_surfaces(parts: list[Surface]) -> Surface:
