@@ -262,6 +262,26 @@ def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, 
     assert Cache(folder).facts.frame_count == 2 and Cache(shot[1]).facts.frame_count == 3
 
 
+def test_settings_that_a_saved_scene_would_lose_are_refused(library, tmp_path, capfd):
+    """An override of an object has its own dynamics; its curves, with the look, stay linked."""
+    linked = next(obj for obj in brought(library, link=True).objects if obj.type == "CURVES")
+    bpy.context.scene.collection.objects.link(linked)
+    hair = linked.override_create(remap_local_usages=True)
+    assert hair.library is None and hair.data.library is not None
+    hair.hairloom.dynamics.device, hair.hairloom.dynamics.collider_resolution = "numpy", 8
+    file = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bake = ["bake", "--scene", file, "--output", str(tmp_path / "out"), "--frames", "1", "1"]
+    for lost in (["--preset", "looks/blond"], ["--set", "shading.ambient=0.25"]):
+        assert command_line.run([*bake, "--save", *lost]) == 1
+        assert "would not have these settings" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert command_line.run([*bake, "--save", "--set", "dynamics.damping=5"]) == 0
+    bpy.ops.wm.open_mainfile(filepath=file)
+    hair = next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
+    assert hair.hairloom.dynamics.damping == 5.0
+
+
 @pytest.mark.parametrize("is_alone", [True, False])
 def test_hair_of_an_instance_is_reported_as_left_out(library, new_hair, tmp_path, capfd, is_alone):
     """The usual layout of shots: instances of characters, whose hair the render engine draws."""

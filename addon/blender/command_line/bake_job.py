@@ -16,7 +16,13 @@ from ..base.report import Report
 from ..preview.bake import Bake, free, is_bakeable, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, report_notes
-from .object_settings import change_settings, check_sections, named_objects, usable_objects
+from .object_settings import (
+    change_settings,
+    check_sections,
+    check_settings_are_saved,
+    named_objects,
+    usable_objects,
+)
 from .scene_files import save_scene
 from .verb import Verb
 
@@ -54,6 +60,7 @@ def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     report, options = job.report, job.options
     if options.save or options.save_as:
         _check_not_linked(objects)
+        check_settings_are_saved(objects, options.preset, options.set)
     check_sections(objects, options.preset, options.set)
     for obj in objects:
         change_settings(obj, options.preset, options.set)

@@ -197,11 +197,38 @@ def check_sections(
     hair = [obj for obj in objects if _is_simulated(obj)]
     used = {name for name in ALL_SETTINGS if any(_group(obj, name) is not None for obj in hair)}
     used.add(job_section)
-    requested = [[section] for section in ALL_SETTINGS if overrides(assignments, section)]
-    requested += [[each.section for each in named_preset(name).all] for name in presets]
-    for sections in requested:
+    for sections in _requested_sections(presets, assignments):
         if used.isdisjoint(sections):
             raise _no_settings(objects, sections[0])
+
+
+def check_settings_are_saved(
+    objects: list[bpy.types.Object], presets: list[str], assignments: list[str]
+) -> None:
+    """Refuse settings of linked curves, which a library override of their object alone leaves
+    linked: Blender does not save them.
+
+    Raises:
+        HairloomError: naming the first such object.
+    """
+    sections = {each for found in _requested_sections(presets, assignments) for each in found}
+    if not any(ALL_SETTINGS[section].owner == "groom" for section in sections):
+        return
+    for obj in objects:
+        if obj.type == "CURVES" and obj.data.library is not None:
+            raise HairloomError(
+                "its curves are linked from another file, so the saved scene would not have these "
+                "settings",
+                place=obj.name,
+                remedy="Make a library override of the curves too (in Properties > Data, "
+                "Shift-click the icon beside their name), or do not save the scene",
+            )
+
+
+def _requested_sections(presets: list[str], assignments: list[str]) -> list[list[str]]:
+    """The sections of each setting and of each preset that is given."""
+    requested = [[section] for section in ALL_SETTINGS if overrides(assignments, section)]
+    return requested + [[each.section for each in named_preset(name).all] for name in presets]
 
 
 def _no_settings(objects: list[bpy.types.Object], section: str) -> HairloomError:
