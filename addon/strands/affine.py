@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Floats
 
 _BLOCK = 8192  # points moved at once, so that they stay in the cache
+_ROUNDING = 1e-5  # of the scales of matrices in single precision
 
 
 def transform_points(points: Floats, matrix: Floats) -> Floats:
@@ -34,6 +35,23 @@ def transform_points(points: Floats, matrix: Floats) -> Floats:
 def mean_scale(matrix: Floats) -> float:
     """The mean scale of an affine (4, 4) matrix: the cube root of its change of volume."""
     return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
+
+
+def without_scale(matrix: Floats, origin: Floats) -> Floats:
+    """The rigid motion that is nearest to an affine (4, 4) one and moves this point (3,) as it
+    does; the same matrix if it is rigid already, or flat.
+
+    Uses the polar decomposition: Higham 1986, "Computing the polar decomposition".
+    """
+    left, sizes, right = np.linalg.svd(np.asarray(matrix, np.float64)[:3, :3])
+    handedness = np.linalg.det(left @ right)
+    is_rigid = np.allclose(sizes, 1.0, rtol=0.0, atol=_ROUNDING) and handedness > 0.0
+    if is_rigid or not sizes[-1] > _ROUNDING * sizes[0]:
+        return matrix
+    result = np.eye(4)
+    result[:3, :3] = (left * [1.0, 1.0, np.sign(handedness)]) @ right
+    result[:3, 3] = matrix[:3, :3] @ origin + matrix[:3, 3] - result[:3, :3] @ origin
+    return result
 
 
 def rotation_about(middle: Floats, angle: float) -> Floats:

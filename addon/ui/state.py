@@ -11,7 +11,7 @@ import bpy
 from ..blender.base.gpu_preferences import memory_in_use, memory_problem
 from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import previews as registry
-from ..blender.preview.diagnostics import instances_note, issues_of, unfelt_note
+from ..blender.preview.diagnostics import instances_note, issues_of, size_note, unfelt_note
 from ..blender.preview.phases import Phase
 from ..blender.preview.previews import previews
 from ..blender.properties.properties import TRANSLATION_CONTEXT
@@ -179,6 +179,7 @@ def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Proble
         view_transform.problem(),
         instances_note(hair),
         unfelt_note(session),
+        size_note(session),
         *notes_of(session.uid),
     )
     for warning in dict.fromkeys((*session.warnings, *filter(None, others))):

@@ -16,9 +16,12 @@ from swinging import play_frames
 from hairloom.addon.blender.base.objects import layer_key
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.preview.diagnostics import size_note
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.arc_length import strand_lengths
+from hairloom.addon.ui.state import problems_of
 
 
 def update():
@@ -354,6 +357,47 @@ def test_hair_that_plays_keeps_its_size_until_it_is_at_rest(preview, get_depsgra
     again = previews.session_of(hair)
     assert again.rig.rest_lengths == pytest.approx(2.0 * length, rel=1e-5)
     assert not previews.is_playing()
+
+
+def test_hair_without_a_surface_that_plays_keeps_its_size_until_it_is_at_rest(
+    new_hair, get_depsgraph
+):
+    """Its length and its thickness are those of one size."""
+    hair = new_hair()
+    session = previews.start(hair, get_depsgraph())
+    hair.hairloom.dynamics.influence = 0.0
+    update()
+    previews.play(get_depsgraph())
+    hair.scale, hair.location.x = (2.0, 2.0, 2.0), 1.0
+    update()
+    scene_events.catch_up(get_depsgraph())
+    previews.advance(get_depsgraph(), 1.0 / 24.0)
+    assert previews.session_of(hair) is session and session.is_playing
+    small = strand_lengths(session.strands, session.rig.strands.offsets)
+    np.testing.assert_allclose(small, session.rig.rest_lengths, rtol=1e-3)
+    assert session.strands[:, 0].mean() > 0.5, "it goes along"
+    assert "keeps its size" in size_note(session)
+    previews.rest(get_depsgraph(), keep_playing=False)
+    again = previews.session_of(hair)
+    np.testing.assert_allclose(again.rig.rest_lengths, 2.0 * small, rtol=1e-3)
+    np.testing.assert_allclose(again.snapshot.radius, 2.0 * session.snapshot.radius, rtol=1e-3)
+    assert size_note(again) == ""
+
+
+def test_a_keyframed_scale_is_reported_where_it_is_not_followed(preview, get_depsgraph):
+    hair, head, _ = preview
+    for frame, size in ((1, 1.0), (3, 2.0)):
+        head.scale = (size, size, size)
+        head.keyframe_insert("scale", frame=frame)
+    bpy.context.scene.frame_set(1)
+    scene_events.catch_up(get_depsgraph())
+    session = previews.session_of(hair)
+    assert size_note(session) == ""
+    for frame in (2, 3):
+        bpy.context.scene.frame_set(frame)
+    assert previews.session_of(hair).is_playing
+    (note,) = [each.text for each in problems_of(hair, session) if "size" in each.text]
+    assert "maybe by keyframes" in note
 
 
 def test_hair_scaled_to_zero_is_not_rebuilt(new_hair, get_depsgraph):

@@ -108,6 +108,21 @@ def unfelt_note(session: Session) -> str:
     return f"{', '.join(names)}: near, but not previewed; Play ignores it, bakes do not"
 
 
+def size_note(session: Session) -> str:
+    """A note on moving hair whose object or surface has another size now, as by keyframes; "" if
+    there is none. Fast enough for every redraw."""
+    try:
+        is_resized = session.is_resized(bpy.context.view_layer.depsgraph)
+    except HairloomError:  # one of them is gone, which the preview reports
+        return ""
+    if not (is_resized and (session.is_playing or session.is_recorded)):
+        return ""
+    return (
+        "Hair or surface is scaled, maybe by keyframes, and moving hair keeps its size. Stop to "
+        "have it in this size; bake again for the size of the first frame"
+    )
+
+
 def _may_instance(obj: bpy.types.Object) -> bool:
     return obj.is_instancer or any(each.type == "NODES" for each in obj.modifiers)
 

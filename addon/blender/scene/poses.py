@@ -8,6 +8,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...rig_flow import Pose
+from ...strands.affine import without_scale
 from ..base.objects import Body
 from .surfaces import read_positions
 
@@ -15,7 +16,8 @@ from .surfaces import read_positions
 def read_pose(
     hair: Body, head: Body | None, vertex_count: int | None, depsgraph: bpy.types.Depsgraph
 ) -> Pose:
-    """The head's vertices and its transform since rest; without a head, the hair object's.
+    """The head's vertices and its transform since rest; without a head, the hair object's, without
+    its scale, as moving hair keeps its size.
 
     Args:
         vertex_count: of the head that the hair was bound to.
@@ -28,7 +30,7 @@ def read_pose(
     if head is None:
         matrix = hair.motion_from_rest(depsgraph)
         check_finite(hair.handle.name, matrix)
-        return Pose(None, matrix)
+        return Pose(None, without_scale(matrix, hair.rest[:3, 3]))
     obj = head.resolve()
     positions = read_positions(obj, depsgraph, place=obj.name)
     if len(positions) != vertex_count:

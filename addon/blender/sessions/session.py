@@ -26,7 +26,6 @@ from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import MotionStart, Pose, Rig, SimulatedSolids, Solids
 from ...strands import Surface
-from ...strands.arc_length import strand_lengths
 from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_out_in, rig_arrays
 from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
@@ -730,23 +729,8 @@ class Session:
             style = motion_flow.carried_guides(rig, self.solver.pose)
             measure.set_style(start(style, rig.curl_slack))
         measure.add_frame(
-            self.solver.strands(), self._rest_lengths(), guides, self._posed_colliders
+            self.solver.strands(), self.rig.rest_lengths, guides, self._posed_colliders
         )
-
-    def _rest_lengths(self) -> Floats:
-        """Lengths of all strands in their style."""
-        rig = self.rig
-        if rig.head is not None:
-            return rig.rest_lengths
-        return strand_lengths(self.rest_points(), rig.strands.offsets)
-
-    def rest_points(self) -> Floats:
-        """All strands at the lengths of their style, (point_count, 3) [m]; hair without a head is
-        scaled with its object."""
-        rig = self.rig
-        if rig.head is not None:
-            return rig.strands.points
-        return motion_flow.carried_strands(rig, self.solver.pose)
 
     def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
         """The colliders of the hair at this moment; none until they are made."""

@@ -138,7 +138,7 @@ def read_drawing(
     if head is None or not is_drawn or may_be_transparent(head):
         snapshot = with_all_strands(snapshot)
     if snapshot.debug_view == "stretch" and len(snapshot.points):
-        snapshot = replace(snapshot, rest=session.rest_points())
+        snapshot = replace(snapshot, rest=session.rig.strands.points)
     elif snapshot.debug_view == "depth":
         snapshot = replace(snapshot, solids=session.solids(depsgraph))
     seen_in = layers_showing(hair)
