@@ -102,6 +102,8 @@ class LongWork:
     def modal(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Block all other events: edits in between would affect only part of the work."""
         if _running is None:
+            undone = f"{self.bl_label} was cancelled by Undo or Redo; {self.state_after_cancel}"
+            report(self, "WARNING", undone)
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS" and _is_cancellable():
             cancel_running()

@@ -425,6 +425,17 @@ def test_a_bake_that_fails_says_in_which_frame_and_leaves_nothing(swinging, tmp_
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("name", ["Hair", "Head"])
+def test_an_object_that_is_deleted_during_a_bake_is_named(name, swinging, tmp_path):
+    steps = Bake.of([swinging[0]], bpy.context.scene).steps()
+    next(steps)
+    bpy.data.objects.remove(bpy.data.objects[name])
+    gone = rf"{name}: this object is gone \(in frame 2\); nothing was baked\. Bake again\."
+    with pytest.raises(HairloomError, match=gone):
+        next(steps)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_hair_that_blender_simulates_is_not_baked(swinging, tmp_path):
     hair, _ = swinging
     modifier = hair.modifiers.new("Swing", "NODES")

@@ -76,6 +76,24 @@ def test_bad_input_is_an_error_of_the_operator() -> None:
     assert seen == []
 
 
+def test_work_that_a_script_has_undone_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    operator = SimpleNamespace(
+        bl_label="Test Work",
+        state_after_cancel="nothing has changed",
+        report=lambda _, text: said.append(text),
+    )
+    steps, ended = counted(counting(3), 3, "things"), []
+    next(steps)
+    running = SimpleNamespace(steps=steps, end=lambda: ended.append(True))
+    monkeypatch.setattr(long_work, "_running", running)
+    long_work._on_undo()
+    assert seen == [1, "closed"] and ended
+    event = SimpleNamespace(type="TIMER", value="NOTHING")
+    assert LongWork.modal(operator, bpy.context, event) == {"CANCELLED"}
+    assert said == ["Test Work was cancelled by Undo or Redo; nothing has changed"]
+
+
 def test_progress_counts_done_of_total() -> None:
     progress = list(counted(counting(2), 2000, "frames"))
     assert progress == [Progress("1 of 2,000 frames", 0.0005), Progress("2 of 2,000 frames", 0.001)]

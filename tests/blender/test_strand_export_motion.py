@@ -277,3 +277,21 @@ def test_motion_into_a_format_without_is_refused(new_hair: Any, tmp_path: Path) 
     )
     with pytest.raises(HairloomError, match=r"TressFX cannot store motion.*Alembic"):
         plan.write(tmp_path / "a.tfx")
+
+
+@pytest.mark.parametrize("children", ["none", "multi"])
+@pytest.mark.parametrize("name", ["Hair", "Head"])
+def test_an_object_that_is_deleted_during_an_export_is_named(
+    name: str, children: str, swinging: Any, get_depsgraph: Any
+) -> None:
+    hair, _ = swinging
+    hair.data.hairloom.children.method = children
+    hair.data.hairloom.children.strand_count = 80
+    settings = StrandExportSettings(use_bake=False)
+    plan = StrandExport.of([hair], get_depsgraph(), ALEMBIC, settings, frames=range(1, LAST))
+    before, positions = bpy.context.scene.frame_current, plan.positions()
+    next(positions)
+    bpy.data.objects.remove(bpy.data.objects[name])
+    with pytest.raises(HairloomError, match=f"{name}: this object is gone. Export again"):
+        next(positions)
+    assert bpy.context.scene.frame_current == before

@@ -29,7 +29,7 @@ from ..bakes.bake_settings import (
 from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete, facts_in
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulation import Simulation
-from ..base.objects import Handle
+from ..base.objects import Handle, ObjectGoneError
 from ..base.report import environment
 from ..base.suspension import suspended
 from ..scene.fin_modifier import clear, fin_modifier
@@ -309,7 +309,7 @@ def _with_frame_in_errors(frame: int) -> Iterator[None]:
         raise HairloomError(
             f"{error.problem} (in frame {frame}); nothing was baked",
             place=error.place,
-            remedy=error.remedy,
+            remedy="Bake again" if isinstance(error, ObjectGoneError) else error.remedy,
         ) from error
 
 

@@ -66,14 +66,20 @@ class BakedMotion:
 
 @dataclass(frozen=True)
 class EvaluatedMotion:
-    """Hair that modifiers and animation move, read again in each frame."""
+    """Hair that modifiers and animation move, read again in each frame.
+
+    head: its surface, None without one.
+    """
 
     export: ExportStrands
     hair: Handle
+    head: Handle | None
     rate: float
     needs_scene: bool = True
 
     def positions_at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
+        if self.head is not None:
+            self.head.resolve("Export again")
         read = posed_curves(self.hair.resolve("Export again"), depsgraph).strands
         if not np.array_equal(read.offsets, self.export.strands.offsets):
             raise _other_curves(self.hair, frame)
@@ -106,7 +112,8 @@ class ChildrenMotion:
         positions = None
         if self.rig.head is not None:
             name = self.body.handle.name
-            positions = read_positions(self.body.resolve(), depsgraph, place=name)
+            body = self.body.handle.resolve("Export again")
+            positions = read_positions(body, depsgraph, place=name)
         pose = Pose(positions, self.body.motion_from_rest(depsgraph))
         return motion_flow.strands_at(self.rig, pose, now)
 
@@ -139,7 +146,9 @@ def moving_hair(
     with _preserving_frame() as set_frame:
         depsgraph = set_frame(frames[0])
         export = read_still_hair(hair, depsgraph, request, cached_rigs)
-        moving: MovingHair = EvaluatedMotion(export, Handle.of(hair), rate)
+        head = head_of(hair)
+        surface = None if head is None else Handle.of(head)
+        moving: MovingHair = EvaluatedMotion(export, Handle.of(hair), surface, rate)
         if export.has_children and export.cached_rig is not None:
             moving = _children_motion(hair, depsgraph, export, export.cached_rig, rate)
     notes: tuple[str, ...] = ()
