@@ -25,6 +25,10 @@ class HairloomError(Exception):
         self.place = place
         self.remedy = remedy
 
+    def at(self, place: str) -> HairloomError:
+        """A copy with another place, such as the name that the artist knows."""
+        return HairloomError(self.problem, place=place, remedy=self.remedy)
+
 
 def did_you_mean(name: str, known: Iterable[str], count: int = 3, similarity: float = 0.6) -> str:
     """The start of a remedy, such as "Did you mean a or b? ", for a wrong name; empty if no known

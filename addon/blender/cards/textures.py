@@ -156,8 +156,7 @@ def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
     try:
         write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)
     except HairloomError as error:  # name the file that it is for, not the temporary one
-        place = error.place.replace(picture.name, path.name)
-        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
+        raise error.at(error.place.replace(picture.name, path.name)) from error
     data = picture.read_bytes()
     picture.unlink()
     return data

@@ -56,7 +56,7 @@ def field_of(
     try:
         return work.result()
     except HairloomError as error:  # stays cached, since the same surface would fail again
-        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
+        raise error.at(place) from error
     except Exception:
         with _lock:
             _works.pop(key, None)  # another try may succeed, such as after memory ran out

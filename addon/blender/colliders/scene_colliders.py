@@ -77,7 +77,7 @@ class SceneColliders:
                 else:
                     part = reader.part()
             except HairloomError as error:
-                colliders._unusable_warnings[obj.name] = str(_with_place(obj.name, error))
+                colliders._unusable_warnings[obj.name] = str(error.at(obj.name))
                 continue
             except NotReadyError:  # go on, so that the other fields are begun too
                 is_complete = False
@@ -173,9 +173,9 @@ class SceneColliders:
 
     def _drop(self, part: Part, error: HairloomError) -> None:
         if self._is_head(part):
-            raise _with_place(part.name, error) from error
+            raise error.at(part.name) from error
         part.track.before = None
-        self._failure_warnings[part.name] = str(_with_place(part.name, error))
+        self._failure_warnings[part.name] = str(error.at(part.name))
 
     def _fields(self) -> dict[int, FieldPart]:
         parts = [part for part in self.parts if isinstance(part, FieldPart)]
@@ -236,11 +236,6 @@ def _parent_key(obj: bpy.types.Object) -> object:
     if obj.parent is None:
         return None
     return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
-
-
-def _with_place(name: str, error: HairloomError) -> HairloomError:
-    """The error, with the object's name as its place."""
-    return HairloomError(error.problem, place=name, remedy=error.remedy)
 
 
 __all__ = ["SceneColliders", "collider_objects", "shape_of"]

@@ -61,8 +61,9 @@ def simulate_hair(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
         try:
             write_bake(plan, job.report, "simulating", "simulate frame")
         except HairloomError as error:
-            place = inputs.groom_name if error.place == hair.name else error.place
-            raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
+            if error.place != hair.name:
+                raise
+            raise error.at(inputs.groom_name) from error
     motion = BakedGuides.in_folder(folder.resolve())
     facts = motion.cache.facts
     assert facts.figures is not None, "it was measured while it was baked"

@@ -163,7 +163,7 @@ def _copied_error(error: Exception) -> Exception:
     """A copy of an error, to be raised again: whenever the same error object is raised, its
     traceback grows and keeps more frames alive."""
     if isinstance(error, HairloomError):
-        return HairloomError(error.problem, place=error.place, remedy=error.remedy)
+        return error.at(error.place)
     return type(error)(*error.args)
 
 

@@ -494,8 +494,7 @@ class Session:
         try:
             return make_solver(rig, self.settings[DynamicsSettings].device, motion, texels)
         except HairloomError as error:
-            place = f"{self.name}, {error.place}"
-            raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
+            raise error.at(f"{self.name}, {error.place}") from error
 
     def take_lights(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""

@@ -57,8 +57,7 @@ def atomic_file_set(path: Path) -> Iterator[Path]:
         raise write_error(path, error.strerror or str(error)) from error
     except HairloomError as error:
         # the message names the path that the caller knows, not the hidden folder
-        place = error.place.replace(str(staging), str(folder))
-        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
+        raise error.at(error.place.replace(str(staging), str(folder))) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
         _remove_empty(missing)
