@@ -13,6 +13,12 @@ from ...errors import HairloomError, did_you_mean
 _SIMILARITY = 0.7
 
 
+def option_name(name: str) -> str:
+    """How the option with this name in the parsed options is typed: skip_existing is
+    --skip-existing."""
+    return "--" + name.replace("_", "-")
+
+
 class VerbParser(argparse.ArgumentParser):
     """The options of a verb. Unknown ones are reported below the usage of this verb, with a
     similar one; argparse itself names them below the list of verbs."""

@@ -32,6 +32,7 @@ from ..cards.files import (
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
 from ..scene.bone_weights import head_bone_of
+from .arguments import option_name
 from .inputs import read_head_look
 from .job_options import (
     add_bake_option,
@@ -194,7 +195,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
         if getattr(job.options, name) is not None:
             raise HairloomError(
                 "it has no effect, because no web page is written",
-                place="--" + name.replace("_", "-"),
+                place=option_name(name),
                 remedy="Leave it out, or add --page",
             )
     motion = settings.motion
@@ -203,7 +204,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
             users = [each for each, names in OF_MOTION.items() if name in names]
             raise HairloomError(
                 f"it has no effect with --motion {motion}",
-                place="--" + name.replace("_", "-"),
+                place=option_name(name),
                 remedy=f"Leave it out, or add --motion {' or '.join(users)}",
             )
 

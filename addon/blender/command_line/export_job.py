@@ -28,6 +28,7 @@ from ..scene.surfaces import read_surface
 from ..strands.groom_motion import BakedMotion
 from ..strands.read_hair import export_strands_of_rig
 from ..strands.strand_export import StrandExport, request_of
+from .arguments import option_name
 from .idle_options import exports_scene_hair
 from .inputs import Inputs
 from .job_options import (
@@ -100,7 +101,7 @@ def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:
     try:
         layout_of(kind, settings)
     except HairloomError as error:
-        option = "--" + error.place.replace("_", "-")
+        option = option_name(error.place)
         is_choice = error.place == "engine"  # the format has this option, but not this value
         problem = error.problem if is_choice else f"it is not an option of {kind.title}"
         raise HairloomError(problem, place=option, remedy=error.remedy) from error

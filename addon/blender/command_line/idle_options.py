@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...errors import HairloomError
+from .arguments import option_name
 from .verb import Verb
 
 
@@ -144,6 +145,6 @@ def check_idle_options(verb: Verb, options: argparse.Namespace) -> None:
             ):
                 raise HairloomError(
                     f"it has no effect here: {idle.why}",
-                    place="--" + name.replace("_", "-"),
+                    place=option_name(name),
                     remedy=idle.remedy,
                 )

@@ -20,6 +20,7 @@ from ..properties.presets import named_preset, shipped_presets
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from ..setup.hairstyles import shipped_hairstyles as hairstyles
+from .arguments import option_name
 from .object_settings import find_hair, is_groom, named_objects, settings_of_object
 from .overrides import overrides
 
@@ -289,7 +290,7 @@ def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
     """Add an option for each parameter of a section, which overrides --set; see
     `section_from_options`."""
     for parameter in kind.parameters():
-        name = "--" + parameter.name.replace("_", "-")
+        name = option_name(parameter.name)
         help_text = parameter.description.replace("%", "%%")
         if parameter.kind == "toggle":
             action = argparse.BooleanOptionalAction if parameter.default else "store_true"
@@ -350,7 +351,7 @@ def check_numbers(options: argparse.Namespace) -> None:
         if value is not None and not minimum <= value <= maximum:
             raise HairloomError(
                 f"{value} cannot be used",
-                place="--" + name.replace("_", "-"),
+                place=option_name(name),
                 remedy=f"Use a number from {minimum:g} to {maximum:g}",
             )
 

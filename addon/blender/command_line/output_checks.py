@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import check_folder_writable, check_writable
+from .arguments import option_name
 from .verb import Verb
 
 #: options for files to write beside --output, and their suffix
@@ -84,7 +85,7 @@ def input_paths(options: argparse.Namespace) -> set[str]:
 
 
 def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace) -> None:
-    option = "--" + name.replace("_", "-")
+    option = option_name(name)
     if suffix and path.suffix.lower() != suffix:
         raise HairloomError(
             f"{option} writes a {suffix} file",

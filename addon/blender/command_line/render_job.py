@@ -17,6 +17,7 @@ from ..bakes.guide_motion import BakedGuides
 from ..base.images import contact_sheet, write_png
 from ..pictures.group_studio import GroupStudio
 from ..pictures.studio import Studio
+from .arguments import option_name
 from .job_options import add_bake_frame_options, add_picture_options
 from .job_steps import (
     Job,
@@ -121,7 +122,7 @@ def _check(job: Job) -> None:
         if getattr(job.options, name):
             raise HairloomError(
                 f"it shows the shadow of one groom, and several are drawn: {', '.join(job.names)}",
-                place="--" + name.replace("_", "-"),
+                place=option_name(name),
                 remedy="Name one of them with --groom",
             )
     if job.options.sheet and job.options.bake is None:
