@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, sums_by
 from ..strands.triangles import areas_of
 
 #: The direction from root to tip in all UVs: "auto" finds it, the others are known.
@@ -70,7 +70,7 @@ def uv_axes(
         known_axis, known_end = _DIRECTIONS[direction]
         none = np.zeros(count, bool)
         return UvAxes(np.full(count, known_axis), np.full(count, known_end), none, none)
-    area = _sums_by_island(island, areas_of(corners))
+    area = sums_by(island, areas_of(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
     usual_axis = int((area * ratio).sum() >= 0.0)
@@ -118,10 +118,8 @@ def _lengths(corners: Floats, uv: Floats, island: Ints) -> Floats:
     """Lengths of each island along u and along v, (island_count, 2) [m]."""
     speed = np.linalg.norm(coordinate_gradients(corners, uv), axis=2)
     weight = areas_of(corners) * (speed > 0.0).all(axis=1)
-    total = np.maximum(_sums_by_island(island, weight), 1e-30)
-    mean = np.stack(
-        [_sums_by_island(island, weight * speed[:, axis]) / total for axis in (0, 1)], axis=1
-    )
+    total = np.maximum(sums_by(island, weight), 1e-30)
+    mean = np.stack([sums_by(island, weight * speed[:, axis]) / total for axis in (0, 1)], axis=1)
     low, high = island_bounds(uv, island)
     lengths: Floats = mean * (high - low)
     return lengths
@@ -141,15 +139,7 @@ def _end_evidence(
     nearness = (_HEIGHT_WEIGHT * corners[:, :, 2] - distance).ravel()
     ends = []
     for is_end in (fraction <= _END_FRACTION, fraction >= 1.0 - _END_FRACTION):
-        count = np.maximum(
-            _sums_by_island(corner_island, is_end.astype(np.float64), len(axis)), 1.0
-        )
-        ends.append(
-            _sums_by_island(corner_island, np.where(is_end, nearness, 0.0), len(axis)) / count
-        )
+        count = np.maximum(sums_by(corner_island, is_end.astype(np.float64), len(axis)), 1.0)
+        ends.append(sums_by(corner_island, np.where(is_end, nearness, 0.0), len(axis)) / count)
     difference: Floats = ends[1] - ends[0]
     return difference
-
-
-def _sums_by_island(island: Ints, values: Floats, count: int = 0) -> Floats:
-    return np.bincount(island, values, minlength=count)

@@ -50,7 +50,7 @@ def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
             if sources:
                 tree.links.new(sources[0], old.to_socket)
         tree.nodes.remove(group)
-    for node in list(_hair_layers(tree, hair)):
+    for node in list(_render_layers(tree, hair)):
         tree.nodes.remove(node)
     if tree.get(_KIND) == "compositor" and tree.users <= 1 and len(tree.nodes) == 2:
         scene.compositing_node_group = None
@@ -63,19 +63,15 @@ def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
 def is_linked(scene: bpy.types.Scene, hair: bpy.types.Scene) -> bool:
     """Whether the compositor has a Render Layers node of the hair and uses it."""
     tree = scene.compositing_node_group
-    if tree is None or not any(_hair_layers(tree, hair)):
+    if tree is None or not any(_render_layers(tree, hair)):
         return False
     groups = (group for group in _hair_groups(tree) if not group.mute)
     return any(group.inputs[HAIR].is_linked and _composites(group, hair) for group in groups)
 
 
-def _render_layers(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
+def _render_layers(tree: Any, scene: bpy.types.Scene | None) -> Iterator[Any]:
+    """The Render Layers nodes of a scene; None: nodes without a scene, as it was removed."""
     return (each for each in tree.nodes if each.bl_idname == _LAYERS and each.scene == scene)
-
-
-def _hair_layers(tree: Any, hair: bpy.types.Scene | None) -> Iterator[Any]:
-    """The Render Layers nodes of a hair scene; None: nodes without a scene, as it was removed."""
-    return _render_layers(tree, hair)
 
 
 def _hair_groups(tree: Any) -> Iterator[Any]:
@@ -146,19 +142,19 @@ def _hair_group() -> Any:
         node.location.x = 220.0 * number
     pairs = (
         (inputs.outputs[STRENGTH], shaded.inputs[0]),
-        (inputs.outputs[IMAGE], _socket_of_type(shaded.inputs, "RGBA", 0)),
-        (inputs.outputs[SHADOW], _socket_of_type(shaded.inputs, "RGBA", 1)),
-        (_socket_of_type(shaded.outputs, "RGBA", 0), over.inputs["Background"]),
+        (inputs.outputs[IMAGE], _color_socket(shaded.inputs, 0)),
+        (inputs.outputs[SHADOW], _color_socket(shaded.inputs, 1)),
+        (_color_socket(shaded.outputs, 0), over.inputs["Background"]),
         (inputs.outputs[HAIR], over.inputs["Foreground"]),
-        (over.outputs[0], _socket_of_type(added.inputs, "RGBA", 0)),
-        (inputs.outputs[SHAFTS], _socket_of_type(added.inputs, "RGBA", 1)),
-        (_socket_of_type(added.outputs, "RGBA", 0), output.inputs[0]),
+        (over.outputs[0], _color_socket(added.inputs, 0)),
+        (inputs.outputs[SHAFTS], _color_socket(added.inputs, 1)),
+        (_color_socket(added.outputs, 0), output.inputs[0]),
     )
     for source, target in pairs:
         tree.links.new(source, target)
     return tree
 
 
-def _socket_of_type(sockets: Any, kind: str, number: int) -> Any:
-    """A socket by type and number: those of a Mix node have the same names for all data types."""
-    return [each for each in sockets if each.type == kind][number]
+def _color_socket(sockets: Any, number: int) -> Any:
+    """A colour's socket by number: those of a Mix node have the same names for all data types."""
+    return [each for each in sockets if each.type == "RGBA"][number]

@@ -173,7 +173,7 @@ def _add_weights(
 
 def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
     """Add nodes of all joints; their numbers, the root first."""
-    first = {"name": ROOT_JOINT, "translation": _vector(root), "children": []}
+    first = {"name": ROOT_JOINT, "translation": file_vector(root), "children": []}
     numbers = [file.append("nodes", first)]
     names = iter(joint_names(*rest.shape[:2]))
     at_root = np.eye(4)
@@ -185,7 +185,7 @@ def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
             local = relative_to_parent(parent, own)
             node = {
                 "name": next(names),
-                "translation": _vector(local[:3, 3]),
+                "translation": file_vector(local[:3, 3]),
                 "rotation": _rotation(quaternions(local[:3, :3])),
             }
             numbers.append(file.append("nodes", node))
@@ -255,7 +255,8 @@ def _add_animation(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> None
     file.append("animations", animation)
 
 
-def _vector(vector: Floats) -> list[float]:
+def file_vector(vector: Floats) -> list[float]:
+    """A vector (3,) in the file's space."""
     return [float(value) for value in GLB.to_file_space(vector)]
 
 

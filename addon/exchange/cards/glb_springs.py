@@ -17,7 +17,7 @@ from ...cards.spring_bones import DOWN, SpringColliders
 from ...cards.spring_chains import SpringRig
 from .card_formats import GLB
 from .glb_file import GlbFile
-from .glb_skin import ROOT_JOINT, add_head_bone, add_skinned
+from .glb_skin import ROOT_JOINT, add_head_bone, add_skinned, file_vector
 
 SPRINGS = "VRMC_springBone"
 _VERSION = "1.0"
@@ -95,10 +95,10 @@ def collider_list(balls: SpringColliders, root: Floats) -> list[dict[str, Any]]:
     """Balls and capsules, in the space of the root joint, which is at `root`, (3,) [m]."""
     shapes: list[dict[str, Any]] = []
     for center, tail, radius in zip(balls.center, balls.tail, balls.radius, strict=True):
-        shape = {"offset": _to_file(center - root), "radius": float(radius)}
+        shape = {"offset": file_vector(center - root), "radius": float(radius)}
         is_capsule = bool((center != tail).any())
         shapes.append(
-            {"capsule": {**shape, "tail": _to_file(tail - root)}}
+            {"capsule": {**shape, "tail": file_vector(tail - root)}}
             if is_capsule
             else {"sphere": shape}
         )
@@ -142,10 +142,6 @@ def _joints(spring: dict[str, Any], node: dict[str, int]) -> list[dict[str, Any]
         }
         for number, name in enumerate(bones)
     ] + [{"node": node[end]}]
-
-
-def _to_file(vector: Floats) -> list[float]:
-    return [float(value) for value in GLB.to_file_space(vector)]
 
 
 def _rounded(values: Floats) -> list[float]:
