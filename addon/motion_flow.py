@@ -14,6 +14,7 @@ from .dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from .dynamics.colliders import PosedCollider
 from .dynamics.constraints import PINNED_COUNT
 from .dynamics.force_fields import NO_FIELDS, ForceFields
+from .dynamics.frame import Drive
 from .dynamics.groom_rotation import fit_rotation, sample_roots
 from .dynamics.held import HeldCvs
 from .dynamics.neighbours import FrameSteps, NeighbourStyle, run_alone
@@ -21,8 +22,8 @@ from .dynamics.painted import PaintedGuides, simulated_fraction
 from .dynamics.rigid_path import AT_REST, Carrier, KnownSubstep
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, rows_of, start
-from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance_in_steps as dynamics_steps
+from .dynamics.step import grid_at_frame_end
 from .groom.holds import Holds
 from .groom.roots import RootFrames, carry_with_roots, root_frames, root_motions
 from .refine.hold import hold_strands

@@ -30,11 +30,11 @@ from hairloom.addon.dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.springs import max_extension_fraction
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.params import Parameter
 
 CV_COUNTS = (2, 3, 4, 8, 16, 24)

@@ -24,7 +24,8 @@ from refinement_probes import adaptive_points, point_textures, read_factors
 
 from hairloom.addon.arrays import piece_starts
 from hairloom.addon.exchange.tressfx import read_tfx
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.refine.detail import PictureView, stations
 from hairloom.addon.refine.settings import DetailSettings

@@ -15,8 +15,9 @@ from shaken import GRAVITY
 
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
-from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.dynamics.frame import Drive
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from hairloom.addon.blender.scene.built_in_head import built_in_head
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.frame import render_image

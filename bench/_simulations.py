@@ -8,9 +8,10 @@ from typing import Protocol
 
 import gpu
 
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.render.dynamics_pass import DynamicsPass
 from hairloom.addon.render.textures import texture_to_array
 

@@ -40,9 +40,9 @@ from hairloom.addon.dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.render.accumulation import Target
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.dynamics_pass import DynamicsPass

@@ -33,9 +33,9 @@ from hairloom.addon.dynamics.colliders import (
     PosedCollider,
 )
 from hairloom.addon.dynamics.colliders.winding import winding_number
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.rig_flow import Pose, Rig

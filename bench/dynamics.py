@@ -28,10 +28,10 @@ from _simulations import ComputeSimulation, NumpySimulation, Simulation, has_com
 from _turns import in_turns
 
 from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.strands import StrandSet, Surface
 
 REFERENCE = "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)"

@@ -22,8 +22,8 @@ from _random_runs import RandomRun, promises_length, random_run, reach_of, shake
 from _report import report, start
 from _simulations import ComputeSimulation, NumpySimulation, Simulation, play
 
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.state import DynamicsState
-from hairloom.addon.dynamics.step import Drive
 
 SECONDS, LIMIT = 2.0, 1.02
 REFERENCE = "lengths at rest, with what curls give"

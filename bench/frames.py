@@ -23,7 +23,8 @@ from _suzanne import suzanne
 from _volume_transparency import _target
 from gpu_calls import gpu_calls
 
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.render.cached_picture import CachedPicture
 from hairloom.addon.render.camera import Camera, frame_camera

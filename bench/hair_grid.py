@@ -49,10 +49,11 @@ from grooms_together import Groom, play_frame
 from hairloom.addon import register, unregister
 from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
 from hairloom.addon.dynamics.force_fields import Falloff, ForceField, ForceFields
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.render.dynamics_pass import DynamicsPass
 

@@ -29,7 +29,8 @@ from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.snapshot import Snapshot

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.neighbours import (
     AdvancingGroom,
     FrameSteps,
@@ -19,7 +20,7 @@ from hairloom.addon.dynamics.neighbours import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive, advance_in_steps
+from hairloom.addon.dynamics.step import advance_in_steps
 
 EARTH = np.array([0.0, 0.0, -9.81])
 

@@ -47,8 +47,6 @@ from .settings import DynamicsSettings
 from .state import DynamicsState
 from .style import restore_style
 
-__all__ = ["Drive", "advance", "advance_in_steps", "grid_at_frame_end", "remaining_displacement"]
-
 #: Maximum number of guides advanced together. With fewer, the overhead of numpy's calls dominates;
 #: with more, the arrays of a substep do not fit into the cache.
 MAX_BLOCK_GUIDES = 12_000

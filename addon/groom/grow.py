@@ -23,10 +23,8 @@ from .bound_strands import bound_strands, checked_weights, interpolate_weights, 
 from .clumps import assign_clumps, style_clumps
 from .growth_surface import GrowthSurface
 from .normal_growth import density_with_length, grow_along_normals
-from .scalp import Cranium, find_cranium, sample_roots, scalp_density, smooth_step
+from .scalp import Cranium, find_cranium, sample_roots, smooth_step
 from .settings import GrowSettings
-
-__all__ = ["grow", "scalp_density"]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
 #: The length of hair that `GrowSettings.droop` refers to [m].

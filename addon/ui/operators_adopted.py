@@ -8,16 +8,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..blender.base.outcome import report
-from ..blender.cards.adopt import (
-    ORDERS,
-    CardOcclusionSettings,
-    SortedCards,
-    SortOptions,
-    sort_steps,
-)
+from ..blender.cards.adopt import ORDERS, SortedCards, SortOptions, sort_steps
 from ..blender.cards.material import alpha_images
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
+from ..cards.occlusion_settings import CardOcclusionSettings
 from ..errors import HairloomError
 from .long_work import LongWork, Steps, as_progress
 from .selection import active_mesh

@@ -8,9 +8,10 @@ from bpy.props import BoolProperty
 from ..blender.base.objects import OVERRIDE, head_of
 from ..blender.base.outcome import report
 from ..blender.colliders import spheres
-from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
+from ..blender.colliders.spheres import FittedSpheres
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
+from ..dynamics.fitting.settings import SphereFitSettings
 from .drawing import draw_button
 from .help import WithHelp
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts

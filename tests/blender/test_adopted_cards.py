@@ -7,9 +7,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from sorting import sort_mesh
 from tiers import few_in_commits
 
-from hairloom.addon.blender.cards.adopt import SortOptions, read_cards, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortOptions, read_cards
 from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.errors import HairloomError

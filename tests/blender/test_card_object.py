@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon.blender.cards.object import CardObjectJob, card_objects
+from hairloom.addon.blender.cards.made_objects import card_objects
+from hairloom.addon.blender.cards.object import CardObjectJob
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.ui.long_work import threaded
 

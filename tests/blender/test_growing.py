@@ -9,7 +9,8 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import settings_of, weights_of_surface
 from hairloom.addon.blender.scene.curves import curve_points, read_curves, set_points
 from hairloom.addon.blender.strands.growing import has_grown, is_outdated, lost_by_regrowing
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import Surface
 

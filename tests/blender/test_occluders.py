@@ -7,14 +7,15 @@ import threading
 import bpy
 import numpy as np
 import pytest
+from sorting import sort_mesh
 from tiers import few_in_commits
 from waiting import run_steps_until
 
 from hairloom.addon import card_flow
 from hairloom.addon.blender.base import latest_job
-from hairloom.addon.blender.cards.adopt import SortOptions, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortOptions
 from hairloom.addon.blender.cards.build import read_inputs
-from hairloom.addon.blender.cards.object import card_objects
+from hairloom.addon.blender.cards.made_objects import card_objects
 from hairloom.addon.blender.cards.occluders import read_occluders
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events

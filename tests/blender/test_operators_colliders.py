@@ -12,10 +12,11 @@ from hairloom.addon.blender.colliders import spheres
 from hairloom.addon.blender.colliders.scene_colliders import SceneColliders
 from hairloom.addon.dynamics.colliders import SphereSetCollider
 from hairloom.addon.dynamics.fitting.settings import SphereFitSettings
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 
 TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
 

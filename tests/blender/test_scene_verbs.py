@@ -11,9 +11,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from sorting import sort_mesh
 
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides
-from hairloom.addon.blender.cards.adopt import SortOptions, sort_mesh
+from hairloom.addon.blender.cards.adopt import SortOptions
 from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.blender.colliders.spheres import fitted_collections
 from hairloom.addon.blender.command_line import command_line

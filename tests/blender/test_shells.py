@@ -17,7 +17,7 @@ bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy modul
 
 from hairloom.addon import rig_flow  # noqa: E402
 from hairloom.addon.blender.cards.build import BuiltCards, CardInputs  # noqa: E402
-from hairloom.addon.blender.cards.object import card_objects  # noqa: E402
+from hairloom.addon.blender.cards.made_objects import card_objects  # noqa: E402
 from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom  # noqa: E402
 from hairloom.addon.blender.sessions.snapshots import snapshot_of  # noqa: E402

@@ -25,7 +25,8 @@ from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.neighbours import run_alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.motion_flow import FrameInput, Motion
 from hairloom.addon.render.snapshot import Snapshot

@@ -29,12 +29,13 @@ from hairloom.addon.dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
+from hairloom.addon.dynamics.step import advance, grid_at_frame_end
 from hairloom.addon.errors import HairloomError
 
 #: tolerances [m] after half a second, in free air and at colliders. Both forms use float32 but sum

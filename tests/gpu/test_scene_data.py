@@ -11,9 +11,10 @@ import pytest
 
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
-from hairloom.addon.render.nearest import projected, unit
+from hairloom.addon.render.nearest import projected
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.strands import Surface
+from hairloom.addon.strands.vectors import unit
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 

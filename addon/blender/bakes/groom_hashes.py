@@ -25,7 +25,8 @@ from ..base.mesh_arrays import corner_vertices, vertex_positions
 from ..base.objects import head_of, matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
 from ..colliders.carriers import is_deforming, is_disabled
-from ..colliders.scene_colliders import collider_objects, shape_of
+from ..colliders.collider_reader import shape_of
+from ..colliders.scene_colliders import collider_objects
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..properties.properties import settings_of

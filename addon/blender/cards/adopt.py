@@ -20,7 +20,7 @@ from ...cards.occlusion import CardOccluder, occlusion_steps
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.sort import SortBy, order_steps
-from ...cards.steps import map_progress, result_of
+from ...cards.steps import map_progress
 from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
@@ -38,15 +38,6 @@ from ..scene.surfaces import (
 from .material import read_alpha
 from .mesh import OCCLUSION_IS_OURS, reorder_faces, set_uv_map
 from .occluders import read_occluders
-
-__all__ = [
-    "ORDERS",
-    "CardOcclusionSettings",
-    "SortOptions",
-    "SortedCards",
-    "sort_mesh",
-    "sort_steps",
-]
 
 #: What can be sorted: identifier, label, description.
 (ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
@@ -139,13 +130,6 @@ def sort_steps(
     notes += problems
     moved = reorder_faces(obj.data, _face_order(source.polygon[order]))
     return SortedCards(mesh.card_count, len(obj.data.polygons), moved, tuple(notes))
-
-
-def sort_mesh(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: SortOptions
-) -> SortedCards:
-    """All steps of `sort_steps` at once."""
-    return result_of(sort_steps(obj, depsgraph, options))
 
 
 def read_cards(

@@ -236,6 +236,3 @@ def _parent_key(obj: bpy.types.Object) -> object:
     if obj.parent is None:
         return None
     return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""
-
-
-__all__ = ["SceneColliders", "collider_objects", "shape_of"]

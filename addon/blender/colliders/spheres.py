@@ -21,17 +21,6 @@ from ..base.objects import accepts_objects, head_of, objects_in
 from ..base.parts import Part, Parts
 from ..scene.surfaces import read_positions, read_surface
 
-__all__ = [
-    "FittedSpheres",
-    "SphereFitSettings",
-    "fit_spheres_to",
-    "fitted_collections",
-    "hair_on",
-    "remove_spheres",
-    "replace_mesh",
-    "use_spheres",
-]
-
 #: Custom property of data-blocks made here: on the collection the mesh, on each Empty True.
 MARK = "hairloom_fitted"
 #: Custom property of the collection: the mesh's collider shape before its spheres replaced it.

@@ -15,7 +15,8 @@ from ...exchange.groom import Groom
 from ...exchange.strand_formats import SUFFIXES
 from ...exchange.strand_reading import read_strands
 from ...groom.face_hair import grow_with_face
-from ...groom.grow import grow, scalp_density
+from ...groom.grow import grow
+from ...groom.scalp import scalp_density
 from ...groom.settings import GrowSettings
 from ...groom.size_notes import size_note
 from ...strands import StrandSet, Surface

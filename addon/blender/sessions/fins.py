@@ -14,7 +14,7 @@ from ...arrays import Floats
 from ...dynamics.cloth.settings import FinSettings
 from ...dynamics.cloth.state import ClothState, vertex_rows
 from ...dynamics.cloth.step import advance_cloth, cloth_at_frame_end
-from ...dynamics.step import Drive
+from ...dynamics.frame import Drive
 from ...errors import HairloomError
 from ...rig_flow import Solids
 from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts

@@ -15,7 +15,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...groom.grow import grow, scalp_density
+from ...groom.grow import grow
+from ...groom.scalp import scalp_density
 from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...strands import StrandSet

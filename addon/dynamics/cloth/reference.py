@@ -14,8 +14,8 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ..contacts import CONTACT_MARGIN
 from ..force_fields import ForceFields
+from ..frame import Drive
 from ..reference.force_fields import previous_after_fields
-from ..step import Drive
 from ..wind import air_from_settings
 from .carried import pinned_path
 from .coloring import greedy_colors, opposite_pairs

@@ -36,9 +36,9 @@ from ...strands.vectors import dot_rows
 from ..colliders import PosedCollider, poses_through
 from ..contacts import find_contacts
 from ..force_fields import ForceFields, apply_force_fields
+from ..frame import Drive
 from ..rigid_path import CarriedPath
 from ..schedule import due_substeps
-from ..step import Drive
 from ..wind import Air, air_from_settings
 from .carried import pinned_path
 from .constraints import (

@@ -16,14 +16,13 @@ from ...arrays import Floats
 from ...params.curve import sample_curve as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD_SWEEPS, HELD_WEIGHT, PINNED_COUNT, ROUNDING
 from ..contacts import MAX_EXTRA_ROUNDS, PART_COUNT, PART_PASS_FACTOR, SEGMENT_POINTS
-from ..frame import Frame, inherits_motion, root_places_after
+from ..frame import Drive, Frame, inherits_motion, root_places_after
 from ..groom_rotation import best_rotation
 from ..hair_grid import UPDATES_PER_SECOND
 from ..rigid_path import RigidMotion, RigidTransform
 from ..settings import DynamicsSettings
 from ..springs import MAX_LINEARISED, max_extension_fraction, stiffness
 from ..state import DynamicsState
-from ..step import Drive
 from ..trajectory import curvature
 from ..wind import air_from_settings
 from .contacts import (

@@ -12,10 +12,11 @@ import pytest
 from hairloom.addon.dynamics.clearance import GuideClearance, guide_clearance, max_clearance
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.force_fields import NO_FIELDS, ForceFields
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.strands import Surface
 
 EARTH = np.array([0.0, 0.0, -9.81])

@@ -17,7 +17,7 @@ from hairloom.addon.dynamics.cloth.settings import FinSettings
 from hairloom.addon.dynamics.cloth.state import distances, start_cloth, vertex_normals
 from hairloom.addon.dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
-from hairloom.addon.dynamics.step import Drive
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import Surface
 

@@ -11,10 +11,11 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.errors import HairloomError
 
 BALL = SphereCollider(np.array([0.02, -0.01, 0.03]), 0.05)

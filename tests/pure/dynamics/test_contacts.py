@@ -11,10 +11,11 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 from hairloom.addon.dynamics.contacts import Contacts, cv_radius, touching_cvs
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.errors import HairloomError
 
 BARE = {"radius_root": 0.0, "radius_tip": 0.0}

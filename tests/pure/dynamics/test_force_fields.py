@@ -24,11 +24,11 @@ from hairloom.addon.dynamics.force_fields import (
     field_effect,
     strand_directions,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import max_stretch
 from hairloom.addon.dynamics.reference.force_fields import acceleration, previous_after_fields
 from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.step import Drive
 
 PERMUTATION = np.random.default_rng(3).permutation(256)
 AXIS = (0.48, 0.6, 0.64)

@@ -8,6 +8,7 @@ from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, 
 from tiers import few_in_commits
 
 from hairloom.addon.dynamics import hair_grid as grid_module
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.hair_grid import (
     LOOK_AHEAD,
     HairGrid,
@@ -18,7 +19,7 @@ from hairloom.addon.dynamics.reference.hair_grid import GroomPoints, friction_an
 from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 
 EARTH, DT = np.array([0.0, 0.0, -9.81]), 1.0 / 180.0
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
+from hairloom.addon.dynamics.step import advance, grid_at_frame_end
 
 WHOLE = {"inherit_location": 1.0, "inherit_rotation": 1.0}
 SOFT = {"style_root": 0.5, "style_tip": 0.0, "bend": 0.5, "length_tolerance": 0.0001}

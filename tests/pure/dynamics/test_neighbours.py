@@ -8,6 +8,7 @@ from grooms_together import Groom, play_frame
 from tails import SOFT_STYLE, cell_count, rotation_matrix, squeezed_tail, tail, two_locks
 
 from hairloom.addon.dynamics import hair_grid
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.hair_grid import (
     HairGrid,
     HairInteraction,
@@ -28,7 +29,7 @@ from hairloom.addon.dynamics.reference.hair_grid import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance, advance_in_steps
+from hairloom.addon.dynamics.step import advance, advance_in_steps
 
 FRAME, DT = 1.0 / 24.0, 1.0 / 180.0
 FULL = DynamicsSettings(volume=1.0, **SOFT_STYLE)

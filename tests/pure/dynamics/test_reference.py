@@ -14,11 +14,12 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 
 #: tolerances [m] of float32 against float64 after 0.4 s: limp strands amplify rounding errors about
 #: seventyfold (so does the slow form, if started one rounding error apart), contacts more.

@@ -8,6 +8,7 @@ import pytest
 from hairloom.addon.dynamics.cloth.carried import pinned_path
 from hairloom.addon.dynamics.cloth.state import start_cloth
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.rigid_path import (
     RigidMotion,
     motion_of,
@@ -17,7 +18,7 @@ from hairloom.addon.dynamics.rigid_path import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 
 PIVOT = np.array([0.02, -0.05, -0.15])
 

@@ -11,8 +11,8 @@ from hairloom.addon.dynamics.cloth.state import start_cloth
 from hairloom.addon.dynamics.cloth.step import advance_cloth
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.colliders.distance_field import DistanceField
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.step import Drive
 
 #: powers of two, so that rounding is the same and there are no differences that could grow
 FACTORS = (2.0**-10, 2.0**10)

@@ -9,12 +9,13 @@ from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.constraints import PINNED_COUNT, TINY, directions
 from hairloom.addon.dynamics.force_fields import ForceField, ForceFields
 from hairloom.addon.dynamics.forces import weight_across_style
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.groom_rotation import best_rotation
 from hairloom.addon.dynamics.held import HeldCvs
 from hairloom.addon.dynamics.measure import max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
-from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
+from hairloom.addon.dynamics.step import advance, grid_at_frame_end
 from hairloom.addon.errors import HairloomError
 
 # --- style ---------------------------------------------------------------------------------------

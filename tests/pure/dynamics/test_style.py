@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from hairloom.addon.dynamics.frame import Drive
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import rows_of, start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.step import advance
 from hairloom.addon.dynamics.style import restore_style, segment_frames, style_system
 from hairloom.addon.strands.frames import transported_normals
 

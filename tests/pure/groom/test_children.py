@@ -16,8 +16,9 @@ from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.children import Children, make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
-from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.grow import grow
 from hairloom.addon.groom.roots import bind_roots, root_frames
+from hairloom.addon.groom.scalp import scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.nearest import nearest_points

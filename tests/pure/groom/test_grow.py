@@ -9,10 +9,10 @@ import pytest
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom import grow as grow_module
-from hairloom.addon.groom.grow import _WHORL, grow, scalp_density
+from hairloom.addon.groom.grow import _WHORL, grow
 from hairloom.addon.groom.growth_surface import GrowthSurface
 from hairloom.addon.groom.roots import bind_roots
-from hairloom.addon.groom.scalp import find_cranium
+from hairloom.addon.groom.scalp import find_cranium, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
 

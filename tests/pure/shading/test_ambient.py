@@ -8,7 +8,6 @@ from spheres import ball
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.shading.ambient import (
-    AmbientSettings,
     HairCells,
     ambient_occlusion,
     depth_towards,
@@ -18,6 +17,7 @@ from hairloom.addon.shading.ambient import (
     sky_openness,
     summed_light,
 )
+from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.density_grid import (
     body_depth,
     grid_around,

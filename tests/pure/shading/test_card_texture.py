@@ -11,10 +11,10 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.card_look import mapped_tangent
 from hairloom.addon.shading.kajiya_kay import shifted_tangent
 from hairloom.addon.shading.texture_noise import strand_drift, strand_slope, stretched_noise
+from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import (
     TEXTURES,
     HairTextures,
-    TextureSettings,
     envelope,
     hair_textures,
     picture_as,
