@@ -109,7 +109,7 @@ def _slabs(depths: Floats, count: int) -> Ints:
 
 @lru_cache(maxsize=64)
 def capacities(max_pieces: int, step: int) -> Ints:
-    """0, and all capacities up to the first of at least `max_pieces` pieces, rising."""
+    """0, and all capacities up to the first of at least `max_pieces` pieces, ascending, (n,)."""
     series = [0]
     while series[-1] < max_pieces:
         series.append(series[-1] + max(series[-1] // step, 1))

@@ -83,7 +83,7 @@ class GoodSide:
     three_quarter: Floats
 
     def turned(self, degrees: float, height: float) -> Floats:
-        """The front, turned towards the three-quarter view; height: z of the result."""
+        """The front, turned towards the three-quarter view, (3,); height: z of the result."""
         left = self.front[0] * self.three_quarter[1] - self.front[1] * self.three_quarter[0]
         turned = _turned(self.front, np.copysign(np.radians(degrees), left))
         return np.array([turned[0], turned[1], height])

@@ -39,8 +39,8 @@ def shifts(number: int, sample: int) -> tuple[float, float]:
 
 
 def scrambled(place: Ints, seed: Ints, other_seed: Ints) -> Floats:
-    """Elements `place` of a sequence that fills [0, 1) evenly. Each pair of seeds has its own order
-    of the sequence. 24 bits, exact in float32.
+    """Elements `place`, (...), of a sequence that fills [0, 1) evenly. Each pair of seeds has its
+    own order of the sequence. 24 bits, exact in float32.
     """
     shuffled = _reversed_bits(_mixed_upwards(_reversed_bits(np.asarray(place, np.uint32)), seed))
     digits = _reversed_bits(_mixed_upwards(shuffled, other_seed))

@@ -53,7 +53,7 @@ class Nearest:
         return np.where(self.depth < 1.0, far, FAR_AWAY).astype(np.float32)
 
     def object_numbers(self, scene: SceneSnapshot) -> Floats:
-        """Object numbers, 0 where there is no surface."""
+        """Object numbers in the shape of `depth`, 0 where there is no surface."""
         found = np.zeros(self.depth.shape, np.float32)
         for indices, drawn in ((self.mesh, scene.meshes), (self.groom, scene.grooms)):
             numbers = np.array([0, *(each.number for each in drawn)], np.float32)
@@ -61,7 +61,8 @@ class Nearest:
         return found
 
     def strand_numbers(self) -> Floats:
-        """Numbers of strands in their groom, counted from 1; 0 where there is no strand."""
+        """Numbers of strands in their groom from 1 on, in the shape of `depth`; 0 where there is no
+        strand."""
         return (self.strand + 1).astype(np.float32)
 
     def on_strands(

@@ -74,7 +74,7 @@ def set_attribute(
 
 
 def copy_elements(attribute: bpy.types.Attribute, source: Ints, target: Ints) -> None:
-    """Copy an attribute's values from source elements to as many target elements."""
+    """Copy an attribute's values from source elements, indices (n,), to target elements, (n,)."""
     if attribute.data_type not in _LAYOUTS:  # strings, one by one
         strings = [attribute.data[number].value for number in source.tolist()]
         for number, string in zip(target.tolist(), strings, strict=True):

@@ -101,8 +101,8 @@ def has_weights(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> bool:
 
 
 def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[Floats, str]:
-    """The weights on a mesh of this object, before or after its modifiers, float32, and their
-    domain.
+    """The weights on a mesh of this object, before or after its modifiers, (n,) float32, and the
+    domain of the n elements.
 
     Raises:
         HairloomError: as `read_weights`.

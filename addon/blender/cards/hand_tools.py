@@ -36,6 +36,9 @@ def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:
 def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats]) -> int:
     """Move the vertices of all cards that have a selected vertex; returns the number of cards.
 
+    Args:
+        shape: gives the vertices' new positions, (vertex_count, 3) [m], object space.
+
     Raises:
         HairloomError: the mesh has no UV map, or a vertex would go to a place that is not finite.
     """

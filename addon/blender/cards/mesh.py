@@ -67,7 +67,11 @@ def set_uv_map(mesh: bpy.types.Mesh, name: str, uv: Floats) -> bool:
 
 
 def reorder_faces(mesh: bpy.types.Mesh, order: Ints) -> int:
-    """Reorder the faces of a mesh with all their data; returns how many moved."""
+    """Reorder the faces of a mesh with all their data; returns how many moved.
+
+    Args:
+        order: (face_count,), the present index of each face in its new order.
+    """
     moved = int((order != np.arange(len(order))).sum())
     if not moved:
         return 0

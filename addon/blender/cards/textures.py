@@ -54,7 +54,7 @@ def picture_files(group: Any) -> list[Path]:
 
 
 def named_pictures(arguments: list[str]) -> dict[str, Floats]:
-    """The pictures from command line arguments NAME=FILE.
+    """The pictures from command line arguments NAME=FILE, shaped as `picture_as` does.
 
     Raises:
         HairloomError: an unknown name, or a file that cannot be used.

@@ -80,7 +80,12 @@ class Track:
     def advance(
         self, collider: Collider, matrix: Floats, duration: float, deformation: float = 0.0
     ) -> PosedCollider:
-        """The trajectory since the previous frame, with the same formula as for roots."""
+        """The trajectory since the previous frame, with the same formula as for roots.
+
+        Args:
+            matrix: (4, 4), object to world, now.
+            duration: of the frame [s].
+        """
         if self.before is None:
             self.reset(matrix)
         assert self.before is not None

@@ -171,7 +171,7 @@ class TrackedHolders:
     def anchors(
         self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
     ) -> Floats:
-        """The matrices of all anchors now, see `groom.holds.anchors_of`."""
+        """The matrices of all anchors now, (anchor_count, 4, 4), see `groom.holds.anchors_of`."""
         warnings = []
         matrices = np.full((holds.tie_count, 4, 4), np.nan)
         current = {obj.session_uid for obj in ties_of(hair)}

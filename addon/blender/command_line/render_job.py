@@ -55,7 +55,8 @@ def render(job: Job) -> None:
 
 
 def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats:
-    """Write a picture of the strands, and report how much was drawn; returns the picture."""
+    """Write a picture of the strands, and report how much was drawn; returns the picture,
+    see `Studio.picture`."""
     options, report = job.options, job.report
     progress = report.progress("drawing the still", studio.sample_count(options.samples))
     with report.stage("draw still"):

@@ -183,6 +183,9 @@ def mesh_object(name: str, surface: Surface, scene: bpy.types.Scene) -> bpy.type
 def shake(head: bpy.types.Object, centre: Floats, last: int, rate: float) -> None:
     """Animate an object at the origin, and the scene's frames: it turns left and right and sways
     from frame 0 to `last`. The motion eases in, so that frame 0 is at rest.
+
+    Args:
+        centre: (3,) world [m], around which it turns. rate: frames in a second.
     """
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 0, last

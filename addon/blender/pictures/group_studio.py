@@ -127,12 +127,12 @@ class GroupStudio(Studio):
         )
 
     def framed_points(self, pose: Pose, points: Floats) -> Floats:
-        """Points of all hair that pictures show, and of the heads near it."""
+        """Points of all hair that pictures show, and of the heads near it, (n, 3) [m]."""
         others = [each.studio.framed_points(each.pose, each.points) for each in self.companions]
         return np.concatenate([super().framed_points(pose, points), *others])
 
     def strand_middles(self, points: Floats) -> Floats:
-        """The middle points of the strands of all grooms."""
+        """The middle points of the strands of all grooms, (strand_count, 3) [m]."""
         others = [each.studio.strand_middles(each.points) for each in self.companions]
         return np.concatenate([super().strand_middles(points), *others])
 

@@ -19,7 +19,7 @@ IMAGE = "Hair Slices"
 
 
 def slices_picture(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
-    """The layers of all lights' maps side by side, see opacity_tiles.
+    """The layers of all lights' maps, (height, width, 4), see `opacity_tiles`.
 
     Raises:
         HairloomError: there are no shadows, or no light casts any.

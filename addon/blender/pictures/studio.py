@@ -125,7 +125,7 @@ class Studio:
         )
 
     def snapshot(self, pose: Pose, points: Floats, guides: Floats | None = None) -> Snapshot:
-        """The hair as `picture` draws it, without meshes and lights."""
+        """The hair as `picture` draws it, without meshes and lights; arguments as there."""
         occluders = self._groom.occluders
         return as_shown(
             replace(
@@ -267,7 +267,8 @@ class Studio:
         samples: int,
         camera: Camera | None = None,
     ) -> Floats:
-        """A picture of these cards instead of the strands at rest; arguments as in `picture`."""
+        """A picture of these cards instead of the strands at rest, (height, width, 4); arguments as
+        in `picture`."""
         camera = camera or self._camera(width / height)
         snapshot = Snapshot(
             points=np.zeros((0, 3), np.float32),

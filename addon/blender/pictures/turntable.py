@@ -118,7 +118,7 @@ class Turntable:
         return self.folder / f"{self.name}_{number:04}.png"
 
     def picture(self, frame: int) -> Floats:
-        """The picture of a frame, from 0; the same after a full turn."""
+        """The picture of a frame, from 0, (height, width, 4); the same after a full turn."""
         settings = self.settings
         return self.studio.picture(
             self.pose,

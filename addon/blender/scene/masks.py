@@ -258,8 +258,8 @@ class MaskReader:
 
 
 def read_map(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
-    """As `read_weights`; if the mesh has no weights of this name, an image of this name at the
-    vertices.
+    """As `read_weights`, (vertex_count,); if the mesh has no weights of this name, an image of this
+    name at the vertices.
 
     Raises:
         HairloomError: not a mesh, or nothing usable of this name.

@@ -53,7 +53,7 @@ class BaseSolver:
 
 
 def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Motion:
-    """A motion that shows baked guides, without colliders.
+    """A motion that shows baked guides, (guide_count, cv_count, 3) world [m], without colliders.
 
     Raises:
         HairloomError: the shape of the guides is not this rig's.

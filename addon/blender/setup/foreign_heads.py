@@ -287,7 +287,7 @@ def _only_deformed(head: bpy.types.Object) -> Iterator[bpy.types.Object]:
 
 
 def placed_landmarks(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Floats]:
-    """The positions of a head's landmarks in world space, by name."""
+    """The positions of a head's landmarks by name, (3,) each, world space [m]."""
     return {
         name: np.array(obj.evaluated_get(depsgraph).matrix_world.translation, np.float64)
         for name, obj in landmarks_of(head).items()
@@ -322,7 +322,8 @@ def add_landmarks(
 def put_landmarks(
     head: bpy.types.Object, places: Mapping[str, Floats], collection: bpy.types.Collection
 ) -> list[bpy.types.Object]:
-    """Add Empties, at these places in world space, for the landmarks that a head lacks."""
+    """Add Empties, at these places (3,) by name, world space [m], for the landmarks that a head
+    lacks."""
     there, made = landmarks_of(head), []
     extent = float(np.linalg.norm(np.ptp(np.array(list(places.values())), axis=0)))
     for name, place in places.items():
@@ -341,7 +342,7 @@ def put_landmarks(
 
 
 def move_landmarks(head: bpy.types.Object, places: Mapping[str, Floats]) -> None:
-    """Move landmarks that have not been dragged to these places in world space."""
+    """Move landmarks that have not been dragged to these places (3,) by name, world space [m]."""
     for name, empty in landmarks_of(head).items():
         if name in places and _is_as_guessed(empty):
             to_world = head.matrix_world @ empty.matrix_parent_inverse

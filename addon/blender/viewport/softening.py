@@ -110,7 +110,7 @@ def lights_of_sample(lights: Sequence[Light], centers: Sequence[Floats]) -> tupl
     """The lights of the next sample.
 
     Args:
-        centers: of all grooms in the view.
+        centers: of all grooms in the view, (3,) world [m] each.
     """
     return lights_at(lights, _softening.picture.count, np.mean(centers, axis=0))
 
