@@ -25,7 +25,8 @@ from hairloom.addon.dynamics.colliders.box import BoxCollider
 from hairloom.addon.dynamics.reference.step import advance_reference
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.dynamics.frame import Drive
+from hairloom.addon.dynamics.step import advance
 
 box = BoxCollider(np.array([0.1, 0.1, 0.05], np.float32))
 along = np.linspace(0.0, 0.1, 8)[:, None]
