@@ -45,6 +45,12 @@ def jittered(camera: Camera, offset: Floats, width: int, height: int, sample: in
     return replace(camera, projection=projection, sample=sample)
 
 
+def sample_place(sample: int, samples: int) -> Floats:
+    """The place (2,) [pixels] of a sample from the middle of its pixel, for `samples` along each
+    side of a pixel; further ones start again."""
+    return (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
+
+
 def view_depth(camera: Camera, depth: Floats) -> Floats:
     """Distance along the view [m] of depth buffer values in [0, 1]."""
     clip = 2.0 * np.asarray(depth, np.float64) - 1.0

@@ -18,7 +18,7 @@ from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.settings import StrandSettings
 from . import gpu_objects
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
-from .camera_window import jittered
+from .camera_window import jittered, sample_place
 from .card_pass import CardPass
 from .light_samples import lights_at
 from .mesh_pass import MeshPass
@@ -132,7 +132,7 @@ def render_still(
     count = still_samples(snapshot.strand_settings, samples)
     for sample in range(count):
         on_sample(sample)
-        place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
+        place = sample_place(sample, samples)
         total += render_image(
             replace(snapshot, lights=lights_at(snapshot.lights, sample, center)),
             jittered(camera, place, width, height, sample),

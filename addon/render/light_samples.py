@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import pi
 
 import numpy as np
 
@@ -33,7 +32,7 @@ def lights_at(lights: Sequence[Light], sample: int, center: Floats) -> tuple[Lig
         center: (3,) [m] the point that a lamp's disk faces.
     """
     place = (0.5 + sample * _STEPS) % 1.0
-    roll = float(0.5 * pi * (sample * _ROLL_STEP % 1.0))
+    roll = float(0.5 * np.pi * (sample * _ROLL_STEP % 1.0))
     return tuple(_light_sample(light, place, roll, np.asarray(center, float)) for light in lights)
 
 

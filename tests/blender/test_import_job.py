@@ -160,7 +160,7 @@ def test_an_unusable_head_is_named(
 def test_missing_materials_of_a_head_are_one_note(tmp_path: Path) -> None:
     head = tmp_path / "head.obj"
     head.write_text(f"mtllib skin.mtl\n{HEAD_OBJ}")
-    note = "head.obj: its materials are plain, as skin.mtl is missing. Put it beside head.obj"
+    note = "head.obj: its materials are plain. Missing beside it: skin.mtl"
     assert read_mesh_file(head, need_uv=False)[1] == (note,)
     assert import_mesh_file(head)[1] == (note,)
     (tmp_path / "skin.mtl").write_text("newmtl skin\n")

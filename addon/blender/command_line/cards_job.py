@@ -196,7 +196,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
             raise HairloomError(
                 "it has no effect, because no web page is written",
                 place=option_name(name),
-                remedy="Leave it out, or add --page",
+                remedy="Omit it, or add --page",
             )
     motion = settings.motion
     for name in sorted({name for names in OF_MOTION.values() for name in names}):
@@ -205,7 +205,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
             raise HairloomError(
                 f"it has no effect with --motion {motion}",
                 place=option_name(name),
-                remedy=f"Leave it out, or add --motion {' or '.join(users)}",
+                remedy=f"Omit it, or add --motion {' or '.join(users)}",
             )
 
 

@@ -274,7 +274,7 @@ def _unknown(problem: str, place: str, known: Any) -> HairloomError:
     """An error whose remedy lists similar names, or all known ones."""
     wrong = problem.split("'")[1]
     suggestions = get_close_matches(wrong, known) or list(known)
-    remedy = "Use one of " + ", ".join(suggestions) if suggestions else "Leave it out"
+    remedy = "Use one of " + ", ".join(suggestions) if suggestions else "Omit it"
     return HairloomError(problem, place=place, remedy=remedy)
 
 

@@ -13,7 +13,7 @@ from ...arrays import Floats
 from ...params import Settings
 from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
-from ...render.camera_window import jittered
+from ...render.camera_window import jittered, sample_place
 from ...render.good_side import GoodSide, good_side
 from ...render.light_samples import lights_at
 from ...render.scene_pass import ScenePass
@@ -80,7 +80,7 @@ class GroupStudio(Studio):
         count = self.sample_count(samples)
         for sample in range(count):
             on_sample(sample)
-            place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
+            place = sample_place(sample, samples)
             lit = lights_at(lights, sample, self._ball.center) if is_soft else lights
             moved = jittered(camera, place, width, height, sample)
             now = replace(scene, lights=lit)

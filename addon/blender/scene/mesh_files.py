@@ -146,9 +146,7 @@ def _missing_notes(path: Path) -> tuple[str, ...]:
     missing = ", ".join(missing_materials(path))
     if not missing:
         return ()
-    return (
-        f"{path.name}: its materials are plain, as {missing} is missing. Put it beside {path.name}",
-    )
+    return (f"{path.name}: its materials are plain. Missing beside it: {missing}",)
 
 
 def merged_surfaces(parts: list[Surface]) -> Surface:
