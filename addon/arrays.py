@@ -8,7 +8,7 @@ Shape, unit, dtype and space of an array are documented where it is created.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -25,6 +25,11 @@ def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
     if one is None or other is None:
         return one is other
     return np.array_equal(one, other, equal_nan=True)
+
+
+def all_equal(some: Sequence[Any], others: Sequence[Any]) -> bool:
+    """Whether two lists of values are equal: arrays of any shape, numbers, texts or None."""
+    return len(some) == len(others) and all(map(np.array_equal, some, others))
 
 
 def same_content(one: Any, other: Any) -> bool:

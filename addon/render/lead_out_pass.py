@@ -34,13 +34,12 @@ from ..refine.lead_out import (
     Clearance,
     LedOut,
 )
-from . import gpu_objects
 from .capabilities import can_read_own_writes
 from .collider_textures import ColliderTextures, SolidKinds, UploadedColliders
 from .shader_program import ShaderRecipe, program
 from .shader_source import LEAD_BLOCK
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
-from .textures import texture_from, texture_to_array
+from .textures import cleared_texture, texture_from, texture_to_array
 
 _GROUP = (64, 1)
 #: replaces infinity on the GPU [m]
@@ -292,14 +291,14 @@ class LeadOutPass:
             spans = layout.spans[:, None].copy()
             spans[:, 0, 3] = clearance.held
             textures["strand_spans"] = texture_from(strand_rows(spans), "RGBA32F")
-            textures["led_points"] = _empty(layout.size)
-            textures["segment_bends"] = _empty(layout.size)
+            textures["led_points"] = cleared_texture(layout.size)
+            textures["segment_bends"] = cleared_texture(layout.size)
             blocks = -(-layout.strand_count // LEAD_BLOCK)
-            textures["near_counts"] = _empty(strand_rows_size(blocks, 1))
-            textures["near_strands"] = _empty(strand_rows_size(layout.strand_count + 1, 1))
+            textures["near_counts"] = cleared_texture(strand_rows_size(blocks, 1))
+            textures["near_strands"] = cleared_texture(strand_rows_size(layout.strand_count + 1, 1))
         if "states" not in textures:
             size = strand_rows_size(layout.strand_count, 1)
-            textures["states"] = _empty(size)
+            textures["states"] = cleared_texture(size)
 
     def _run(
         self,
@@ -354,9 +353,3 @@ class LeadOutInputs:
     max_clearance: float
     return_angle: float
     finds_near_while_riding: bool
-
-
-def _empty(size: tuple[int, int]) -> Any:
-    texture = gpu_objects.texture(size, format="RGBA32F")
-    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-    return texture

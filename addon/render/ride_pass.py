@@ -43,14 +43,13 @@ from ..groom.roots import RootHolds
 from ..refine.lead_out import NO_LED_OUT, LedOut
 from ..refine.ride import Riders
 from ..strands import StrandSet
-from . import gpu_objects
 from .collider_textures import SolidKinds, UploadedColliders
 from .hold_pass import HoldPass
 from .lead_out_pass import LeadOutPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .snapshot import DevicePoints
 from .strand_layout import StrandLayout, strand_rows, strand_rows_size
-from .textures import texture_from, texture_to_array
+from .textures import cleared_texture, texture_from, texture_to_array
 
 ROOTS_RECIPE = ShaderRecipe(
     name="ride_roots",
@@ -306,16 +305,16 @@ class RidePass:
         textures["strand_spans"] = texture_from(texels.strand_spans, "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
-        textures["guide_turns"] = _empty(*self._guide_grid.shape[:2])
+        textures["guide_turns"] = _cleared_rows(*self._guide_grid.shape[:2])
         at_rest = np.zeros((*self._guide_grid.shape[:2], 4))
         at_rest[:, :-1, 3] = 1.0
         textures["rest_turns"] = texture_from(strand_rows(at_rest), "RGBA32F")
-        self.points.texture = _cleared(self.points.layout.size)
+        self.points.texture = cleared_texture(self.points.layout.size)
         if self._root_holds is not None and texels.root_holds is not None:
             textures["root_holds"] = texture_from(texels.root_holds, "RGBA32F")
-            textures["root_motions"] = _empty(count, 4)
-            textures["frames"] = _empty(count, 4)
-            textures["rest_frames"] = _empty(count, 4)
+            textures["root_motions"] = _cleared_rows(count, 4)
+            textures["frames"] = _cleared_rows(count, 4)
+            textures["rest_frames"] = _cleared_rows(count, 4)
             self._run_roots(self._root_holds.rest_positions)
             rest_frames = textures.pop("frames")
             textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
@@ -331,7 +330,7 @@ class RidePass:
         points = _padded(self._guide_grid)
         if self._riders.can_extend is not None:
             points[:, :-1, 3] = self._riders.can_extend
-            textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
+            textures["guide_axes"] = _cleared_rows(*self._guide_grid.shape[:2])
         textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
         textures["guide_weights"] = texture_from(guide_weights, "RGBA32F")
 
@@ -416,15 +415,9 @@ def _padded(values: Floats) -> Floats:
     return padded
 
 
-def _empty(strand_count: int, column_count: int) -> Any:
+def _cleared_rows(strand_count: int, column_count: int) -> Any:
     """An RGBA32F texture in the layout of strand_rows, cleared to 0."""
-    return _cleared(strand_rows_size(strand_count, column_count))
-
-
-def _cleared(size: tuple[int, int]) -> Any:
-    texture = gpu_objects.texture(size, format="RGBA32F")
-    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-    return texture
+    return cleared_texture(strand_rows_size(strand_count, column_count))
 
 
 def _named(textures: dict[str, Any], *names: str) -> dict[str, Any]:

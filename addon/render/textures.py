@@ -34,6 +34,13 @@ def volume_from(texels: Floats) -> Any:
     return gpu_objects.texture((width, height, depth), format="RGBA32F", data=data)
 
 
+def cleared_texture(size: tuple[int, int]) -> Any:
+    """An RGBA32F 2D texture of this width and height that is 0 everywhere."""
+    texture = gpu_objects.texture(size, format="RGBA32F")
+    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    return texture
+
+
 def texture_to_array(texture: Any) -> Floats:
     """A float texture as (height, width, channels) float32, row 0 at the bottom."""
     pixels = np.asarray(texture.read(), np.float32)  # a view of the memory read, without a copy

@@ -8,7 +8,7 @@ from typing import Any, Concatenate
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, all_equal
 from ..errors import HairloomError
 from .affine import transform_points
 from .triangles import area_vectors
@@ -103,7 +103,7 @@ class Surface:
         cache: dict[Any, tuple[tuple[Any, ...], Any]] = vars(self).setdefault("_made_last", {})
         inputs = (*arguments, *named.values())
         last = cache.get(make)
-        if last is None or not _are_equal(last[0], inputs):
+        if last is None or not all_equal(last[0], inputs):
             cache[make] = last = inputs, make(self, *arguments, **named)
         result: T = last[1]
         return result
@@ -148,10 +148,6 @@ def _shared_normals(surface: Surface, total: Floats) -> Floats:
 def _places(surface: Surface) -> Ints:
     """A number for each vertex, the same for coincident ones, (vertex_count,)."""
     return unique_position_indices(surface.positions)
-
-
-def _are_equal(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
-    return len(some) == len(others) and all(map(np.array_equal, some, others))
 
 
 def _broken(problem: str) -> HairloomError:

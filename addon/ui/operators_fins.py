@@ -171,51 +171,46 @@ def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         layout.prop(obj.hairloom.fin, "enabled", text="")
 
 
-class HAIRLOOM_PT_fin(WithHelp, bpy.types.Panel):
+class _FinPanel(WithHelp):
+    """A panel of the cloth that the active mesh is, or may become."""
+
+    help_section = "fin"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self: Any, context: bpy.types.Context) -> None:
+        draw_switch(self.layout, context.object)
+
+    def draw(self: Any, context: bpy.types.Context) -> None:
+        self.layout.use_property_split = True
+        self.layout.use_property_decorate = False
+        draw_fin(self.layout, context.object)
+
+
+class HAIRLOOM_PT_fin(_FinPanel, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Hairloom Cloth"
-    help_section = "fin"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.object is not None and context.object.type == "MESH"
 
-    def draw_header(self, context: bpy.types.Context) -> None:
-        draw_switch(self.layout, context.object)
 
-    def draw(self, context: bpy.types.Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        draw_fin(self.layout, context.object)
-
-
-class HAIRLOOM_PT_sidebar_fin(WithHelp, bpy.types.Panel):
+class HAIRLOOM_PT_sidebar_fin(_FinPanel, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Cloth"
-    help_section = "fin"
     bl_parent_id = "HAIRLOOM_PT_sidebar"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Hairloom"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return active_mesh(context) is not None
-
-    def draw_header(self, context: bpy.types.Context) -> None:
-        draw_switch(self.layout, context.object)
-
-    def draw(self, context: bpy.types.Context) -> None:
-        self.layout.use_property_split = True
-        self.layout.use_property_decorate = False
-        draw_fin(self.layout, context.object)
 
 
 def _can_change_modifiers(operator: type[Any], context: bpy.types.Context) -> bool:

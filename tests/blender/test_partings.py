@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hairloom.addon.arrays import all_equal
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.engine import engine_hair
@@ -13,7 +14,7 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.curves import curve_points
 from hairloom.addon.blender.scene.drawn_lines import new_line, pieces_of
-from hairloom.addon.blender.scene.partings import is_same_state, parting_state, partings_of
+from hairloom.addon.blender.scene.partings import parting_state, partings_of
 from hairloom.addon.strands import StrandSet
 
 RADIUS = 0.1
@@ -122,7 +123,7 @@ def test_changes_of_a_parting_are_noticed_and_motion_with_its_head_is_not(edit, 
     before = parting_state(hair)
     body.location.x += 0.5
     sphere.rotation_euler.z = 0.5
-    assert is_same_state(parting_state(hair), before)
+    assert all_equal(parting_state(hair), before)
     if edit == "cyclic":
         line.data.splines[0].use_cyclic_u = True
     elif edit == "edge":
@@ -133,7 +134,7 @@ def test_changes_of_a_parting_are_noticed_and_motion_with_its_head_is_not(edit, 
         mesh.to_mesh(line.data)
     else:
         handle.location.x = 0.01
-    assert not is_same_state(parting_state(hair), before)
+    assert not all_equal(parting_state(hair), before)
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import (
+    all_equal,
     pieces_of_rows,
     rows_of_pieces,
     rows_of_ranges,
@@ -57,6 +58,15 @@ def test_it_is_the_same(one: Any, other: Any) -> None:
 )
 def test_it_is_not_the_same(one: Any, other: Any) -> None:
     assert not same_content(one, other)
+
+
+def test_lists_are_equal_if_all_their_values_are() -> None:
+    """Arrays of any shape and type, numbers, texts and None."""
+    values = [CORNERS, 1, "a", None]
+    assert all_equal(values, (CORNERS.astype(np.float64), 1, "a", None))
+    assert not all_equal(values, values[:3])
+    for other in ([CORNERS[:2], 1, "a", None], [CORNERS, 1, "b", None], [CORNERS, 1, "a", CORNERS]):
+        assert not all_equal(values, other)
 
 
 def test_what_was_found_of_it_does_not_count() -> None:

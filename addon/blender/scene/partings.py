@@ -53,11 +53,6 @@ def _parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
         yield obj
 
 
-def is_same_state(one: tuple[Floats | str, ...], other: tuple[Floats | str, ...]) -> bool:
-    """Whether two results of `parting_state` are equal."""
-    return len(one) == len(other) and all(map(np.array_equal, one, other))
-
-
 def _line_points(obj: bpy.types.Object) -> Floats:
     """The control points of a curve and how they are joined, or the vertices and edges of a mesh,
     before modifiers."""

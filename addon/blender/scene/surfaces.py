@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, all_equal
 from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.affine import transform_points
@@ -131,12 +131,9 @@ def _shape_key_positions(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -
 
 
 def _is_same(one: Surface, other: Surface) -> bool:
-    if (one.corner_uv is None) != (other.corner_uv is None):
-        return False
-    return (
-        np.array_equal(one.positions, other.positions)
-        and np.array_equal(one.triangles, other.triangles)
-        and (one.corner_uv is None or np.array_equal(one.corner_uv, other.corner_uv))  # type: ignore[arg-type]
+    return all_equal(
+        (one.positions, one.triangles, one.corner_uv),
+        (other.positions, other.triangles, other.corner_uv),
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints, are_same, pieces_of_rows
+from ...arrays import Floats, Ints, all_equal, are_same, pieces_of_rows
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
@@ -32,7 +32,7 @@ from ..colliders.ties import TrackedHolders
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
 from ..scene.masks import MaskReader
-from ..scene.partings import is_same_state, parting_state, read_partings
+from ..scene.partings import parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import (
     Source,
@@ -131,7 +131,7 @@ class GroomSource:
     def has_changed_partings(self) -> bool:
         """Whether partings have been added, removed, moved or edited."""
         hair = self.hair.handle.find()
-        return hair is not None and not is_same_state(parting_state(hair), self._parting_state)
+        return hair is not None and not all_equal(parting_state(hair), self._parting_state)
 
     def rig(self) -> Rig:
         """The groom prepared to move.

@@ -16,7 +16,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ... import light_flow, rig_flow
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, all_equal
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...light_flow import HairLight, quick_light, rest_light
@@ -64,10 +64,9 @@ class BuildRequest:
             self.settings.rig_settings == other.settings.rig_settings
             and one.strands is two.strands
             and one.head is two.head
-            and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
             and one.masks == two.masks
             and one.holders == two.holders
-            and np.array_equal(one.partings, two.partings)  # type: ignore[arg-type]
+            and all_equal((one.density, one.partings), (two.density, two.partings))
         )
 
 
