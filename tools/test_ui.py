@@ -57,7 +57,7 @@ TUTORIALS = {
     "tutorial_eevee_shot": "opengl",
 }
 #: Sessions that are left out for a commit, beside the tutorials. One makes pictures of the
-#: documentation, one waits for minutes, and eight draw for minutes what other sessions check too:
+#: documentation, one waits for minutes, and nine draw for minutes what other sessions check too:
 #: `engine` and `shadows` check light and shadows, `random` and `everyday` what interrupts Play,
 #: `long_work` cancelled work and Esc in a turntable, `layers` hair from near and far, `import` the
 #: options in a file browser, `combing` and `growing` edits by hand and their undo.
@@ -66,6 +66,7 @@ NOT_IN_COMMITS = (
     "guide_pictures",
     "autosave",
     "body_shadow",
+    "closing",
     "first_light",
     "jobs",
     "midplay",
@@ -84,6 +85,7 @@ _SMALL_SCREEN_SESSIONS = (
 )
 SCREENS = {f"session_{name}": _SMALL for name in _SMALL_SCREEN_SESSIONS} | {
     **{f"session_{name}": "1024x900x24" for name in TUTORIALS},
+    "session_closing": "800x600x24",
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
