@@ -80,25 +80,35 @@ def build_tree(corners: Floats) -> TriangleTree:
     """
     depth = max(0, int(np.ceil(np.log2(len(corners) / LEAF_SIZE))))
     padded = np.minimum(np.arange(LEAF_SIZE << depth), len(corners) - 1)
-    order = _median_order(corners.mean(axis=1), padded, depth)
-    low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
-    levels = []
-    for level in range(depth + 1):
-        shape = (1 << level, -1, 3)
-        lowest, highest = low.reshape(shape).min(axis=1), high.reshape(shape).max(axis=1)
-        levels.append((np.ascontiguousarray(lowest.T), np.ascontiguousarray(highest.T)))
-    return TriangleTree(tuple(levels), order.reshape(-1, LEAF_SIZE))
+    # one row per axis: numpy is slow on rows of three
+    columns = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    leaves = _median_leaves(columns.mean(axis=0), padded, depth)
+    low = columns.min(axis=0).take(leaves, axis=1).min(axis=1)
+    high = columns.max(axis=0).take(leaves, axis=1).max(axis=1)
+    levels = [(low, high)]
+    for _ in range(depth):
+        low = np.minimum(low[:, ::2], low[:, 1::2])
+        high = np.maximum(high[:, ::2], high[:, 1::2])
+        levels.append((low, high))
+    return TriangleTree(tuple(reversed(levels)), np.ascontiguousarray(leaves.T))
 
 
-def _median_order(centers: Floats, order: Ints, depth: int) -> Ints:
-    """`order` sorted so that the two halves of every node lie on either side of its median."""
-    for level in range(depth):
-        nodes = order.reshape(1 << level, -1)
-        inside = centers[nodes]
-        axis = np.ptp(inside, axis=1).argmax(axis=1)
-        along = np.take_along_axis(inside, axis[:, None, None], axis=2)[..., 0]
-        order = np.take_along_axis(nodes, along.argsort(axis=1, kind="stable"), axis=1).ravel()
-    return order
+def _median_leaves(centers: Floats, order: Ints, depth: int) -> Ints:
+    """`order` as leaves, one per column, so that the two halves of every node lie on either side of
+    its median.
+
+    Args:
+        centers: (3, triangle_count).
+    """
+    nodes = order[:, None]  # one per column
+    for _ in range(depth):
+        inside = centers.take(nodes, axis=1)
+        axis = (inside.max(axis=1) - inside.min(axis=1)).argmax(axis=0)
+        along = np.take_along_axis(inside, axis[None, None], axis=0)[0]
+        nodes = np.take_along_axis(nodes, along.argsort(axis=0, kind="stable"), axis=0)
+        half = len(nodes) // 2
+        nodes = np.stack([nodes[:half], nodes[half:]], axis=2).reshape(half, -1)
+    return nodes
 
 
 def _columns(columns: Ints, *tables: Floats) -> Iterator[Floats]:

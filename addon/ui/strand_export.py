@@ -26,7 +26,7 @@ from ..exchange.strand_formats import StrandFormat
 from ..params import Parameter
 from . import operators_export_check as export_check
 from .file_paths import FILE_TO_WRITE
-from .long_work import LongWork, Progress, Steps
+from .long_work import LongWork, Progress, Steps, threaded
 from .operators_export_check import exportable_hair
 from .reports import report_outcome
 from .selection import needs_hair, target_hair
@@ -68,7 +68,7 @@ def _options(kind: StrandFormat) -> list[Parameter]:
 
 
 class StrandExportOperator(LongWork, ExportHelper):
-    """Base of the export operators of all formats. Motion is written in steps; Esc cancels."""
+    """Base of the export operators of all formats. Files are written in threads; Esc cancels."""
 
     bl_options: ClassVar[set[str]] = {"PRESET"}
     state_after_cancel = "the file is as it was before"
@@ -132,10 +132,8 @@ class StrandExportOperator(LongWork, ExportHelper):
         for done, (path, plan) in enumerate(plans):
             if done:
                 self.state_after_cancel = f"{done:,} of {len(plans):,} files are written"
-            if plan.frames is None:
-                report_outcome(self, plan.write(path))
-            else:
-                report_outcome(self, (yield from _write_motion(path, plan)))
+            write = _write_still if plan.frames is None else _write_motion
+            report_outcome(self, (yield from write(path, plan)))
 
     def cancel(self, context: bpy.types.Context) -> None:
         export_check.close_check()
@@ -231,6 +229,13 @@ class MotionOptions:
     frames: EnumProperty(name="Frames", description="Frames to write", items=_FRAMES)
     first: IntProperty(name="First", description="First frame", default=1)
     last: IntProperty(name="Last", description="Last frame", default=250)
+
+
+def _write_still(path: Path, plan: StrandExport) -> Steps[Outcome]:
+    """Write in a thread, so that the window responds while a large file is written."""
+    work = plan.write_in_thread(path)
+    work.stage = "Writing the file"
+    return (yield from threaded(work))
 
 
 def _write_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:

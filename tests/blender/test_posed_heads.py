@@ -18,6 +18,7 @@ from hairloom.addon.blender.strands.groom_motion import moving_hair
 from hairloom.addon.blender.strands.make_real import make_real
 from hairloom.addon.blender.strands.read_hair import ExportRequest
 from hairloom.addon.groom.roots import bind_roots
+from hairloom.addon.strands import closest_point
 
 REST, POSED = 1, 4
 #: tolerance [m]: frames turn strands in float32
@@ -163,6 +164,20 @@ def test_a_head_that_is_subdivided_but_not_posed_moves_no_hair(hair, sphere):
     assert np.array_equal(source.strands.points, read_curves(hair, depsgraph).strands.points)
     # in a pose, hair is as far from the smooth skin as at rest
     assert read_source(hair, go_to(POSED)).strands.points == pytest.approx(expected(hair), abs=1e-2)
+
+
+def test_hair_that_is_read_again_searches_its_head_as_before(hair, sphere, monkeypatch):
+    """A search of a large head takes long to prepare, and hair is read after each edit."""
+    sphere.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    depsgraph, prepared = go_to(POSED), []
+    prepare = closest_point.build_tree
+    monkeypatch.setattr(
+        closest_point, "build_tree", lambda corners: prepared.append(1) or prepare(corners)
+    )
+    first = read_source(hair, depsgraph)
+    assert len(prepared) == 2  # the head as posed, and at rest
+    assert read_source(hair, depsgraph).rest.surface is first.rest.surface
+    assert len(prepared) == 2
 
 
 def test_a_shape_key_is_a_pose_too(new_hair, sphere):

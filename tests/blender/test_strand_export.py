@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from strand_files import (
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.blender.strands.export_check import ExportCheck
+from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
@@ -40,6 +42,25 @@ def test_a_strand_of_a_metre_stands_where_unreal_looks_for_it(
     np.testing.assert_allclose(curves["points"][0][0], [100.0, -200.0, 300.0], rtol=1e-6)
     np.testing.assert_allclose(curves["points"][0][4], [100.0, -200.0, 400.0], rtol=1e-6)
     np.testing.assert_allclose(curves["groom_width"], 8e-3, rtol=1e-6)
+
+
+def test_a_file_is_written_in_a_thread(
+    new_hair: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The window responds while a large file is written."""
+    new_hair(strands=straight_strands())
+    writers = []
+
+    def write(*given: Any) -> Any:
+        writers.append(threading.current_thread())
+        return written(*given)
+
+    written = StrandExport.write
+    monkeypatch.setattr(StrandExport, "write", write)
+    path = tmp_path / "hair.tfx"
+    assert bpy.ops.hairloom.export_tressfx(filepath=str(path)) == {"FINISHED"}
+    assert path.is_file()
+    assert threading.main_thread() not in writers and len(writers) == 1
 
 
 @pytest.mark.parametrize(

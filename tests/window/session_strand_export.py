@@ -78,7 +78,8 @@ def the_check_stands_beside_the_options():
     driver.screenshot("options")
     yield from confirm_file_browser()
     yield from wait_until((FOLDER / "hair.abc").exists, "nothing is written")
-    assert check.hair_count() == 0 and not running_label()
+    yield from wait_until(lambda: not running_label(), "the export does not end")
+    assert check.hair_count() == 0
 
 
 def motion_comes_in_steps():

@@ -105,12 +105,18 @@ def read_rest_surfaces(
             _shape_key_positions(original, depsgraph),
         ]
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
-    surfaces = [
-        replace(posed, positions=transform_points(each, matrix))
+    positions = [
+        transform_points(each, matrix)
         for each in found
         if each is not None and each.shape == posed.positions.shape and np.isfinite(each).all()
     ]
+    # the same objects until one changes, with all that was computed on them
+    surfaces = posed.compute_if_changed(_with_positions, *positions)
     return surfaces, is_deformed_only
+
+
+def _with_positions(posed: Surface, *positions: Floats) -> list[Surface]:
+    return [replace(posed, positions=each) for each in positions]
 
 
 def _shape_key_positions(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | None:

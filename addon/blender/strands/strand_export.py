@@ -149,12 +149,15 @@ class StrandExport:
         groom = replace(self.groom, strands=self.groom.strands.with_points(points))
         return replace(self, groom=groom, frames=None, moving=())
 
-    def write_in_thread(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
+    def write_in_thread(
+        self, path: Path, positions: Generator[Floats] | None = None
+    ) -> ThreadWork[Outcome]:
         """`write` in a thread, which has the main thread produce each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
             commit_context.set(thread.commit_context)  # a context variable of this thread alone
-            return self.write(path, _positions_from_main_thread(thread, positions))
+            frames = None if positions is None else _positions_from_main_thread(thread, positions)
+            return self.write(path, frames)
 
         return ThreadWork(work, "Hairloom strands")
 
