@@ -182,8 +182,13 @@ def begin(name, **settings):
 
 def has_begun():
     yield from wait_until(running_label, "it does not begin")
-    for _ in range(4):
-        yield 1
+    yield 1
+    assert running_label(), "it has already ended"
+
+
+def is_half_written():
+    """Wait until there are files of the job, not yet at their place."""
+    yield from wait_until(lambda: found() != kept(), "it writes nothing")
     assert running_label(), "it has already ended"
 
 
@@ -196,6 +201,7 @@ def from_the_file_browser(name, file, **settings):
 
 def exporting_motion():
     yield from from_the_file_browser("export_alembic", "hair.abc", frames="scene")
+    yield from is_half_written()
 
 
 def exporting_cards():
@@ -204,6 +210,7 @@ def exporting_cards():
 
 def baking():
     yield from begin("bake")
+    yield from is_half_written()
 
 
 def making_cards():
@@ -257,6 +264,7 @@ def checking():
 
 def turning():
     yield from begin("turntable", directory=str(FOLDER), frames=2000, **SMALL)
+    yield from is_half_written()
 
 
 def rendering():
