@@ -82,7 +82,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     )
     first_frame: IntProperty(name="First", description="First frame to write", default=1)
     last_frame: IntProperty(name="Last", description="Last frame to write", default=250)
-    __annotations__ |= operator_properties("cards_export", clamps=False)
+    __annotations__ |= operator_properties("cards_export")
 
     @property
     def filename_ext(self) -> str:

@@ -16,9 +16,11 @@ from ..blender.pictures.showing import ShownGroom, file_name, shown_groom
 from ..blender.pictures.turntable import (
     FRAME_LIMITS,
     LIGHTS,
+    SAMPLE_LIMITS,
     SIDE_LIMITS,
     Turntable,
     TurntableSettings,
+    check_limit,
 )
 from ..errors import HairloomError
 from .file_paths import FILE_TO_WRITE, FOLDER_OF_PICTURES
@@ -27,8 +29,14 @@ from .reports import reporting, wait_cursor
 from .selection import needs_hair, target_hair
 
 _SAMPLES = IntProperty(
-    name="Samples", description="Subpixels along each side of a pixel", default=3, min=1, max=4
+    name="Samples",
+    description="Subpixels along each side of a pixel",
+    default=3,
+    soft_min=SAMPLE_LIMITS[0],
+    soft_max=SAMPLE_LIMITS[1],
 )
+#: side of each picture of a contact sheet [pixels], min and max
+_SHEET_LIMITS = SIDE_LIMITS[0], SIDE_LIMITS[1] // 4
 
 
 class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
@@ -49,16 +57,14 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         name="Frames",
         description="Number of pictures in a full turn",
         default=48,
-        min=FRAME_LIMITS[0],
-        max=FRAME_LIMITS[1],
+        soft_min=FRAME_LIMITS[0],
         soft_max=360,
     )
     size: IntProperty(
         name="Size",
         description="Width and height of the pictures in pixels",
         default=720,
-        min=SIDE_LIMITS[0],
-        max=SIDE_LIMITS[1],
+        soft_min=SIDE_LIMITS[0],
         soft_max=2048,
         subtype="PIXEL",
     )
@@ -141,8 +147,8 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
         name="Size",
         description="Width and height of each picture on the sheet in pixels",
         default=480,
-        min=SIDE_LIMITS[0],
-        max=SIDE_LIMITS[1] // 4,
+        soft_min=_SHEET_LIMITS[0],
+        soft_max=_SHEET_LIMITS[1],
         subtype="PIXEL",
     )
     samples: _SAMPLES
@@ -155,6 +161,8 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     def execute(self, context: bpy.types.Context) -> set[str]:
         manager = context.window_manager
         path = path_to_write(self.filepath, self.filename_ext, place=self.bl_label)
+        check_limit("contact sheet", "size", self.size, _SHEET_LIMITS)
+        check_limit("contact sheet", "samples", self.samples, SAMPLE_LIMITS)
         with wait_cursor(context):
             shown = _shown(self, context)
             sheet = Sheet(

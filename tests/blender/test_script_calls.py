@@ -4,6 +4,7 @@ ours and the scene is as it was before."""
 import re
 
 import bpy
+import numpy as np
 import pytest
 from tiers import few_in_commits
 
@@ -11,9 +12,12 @@ from hairloom.addon import registration
 
 pytestmark = pytest.mark.usefixtures("extension")
 
+_MOST = float(np.finfo(np.float32).max)
 #: operators that bring their own hair, or change presets, clipboard or folders
 ELSEWHERE = {"add_hairstyle", "sample_scene", "help", "self_test", "copy_report", "copy_reports"}
 ELSEWHERE |= {"save_preset"}
+#: type of a property -> the range of one without limits
+UNLIMITED = {"INT": (-(2**31), 2**31 - 1), "FLOAT": (-_MOST, _MOST)}
 
 
 def operators():
@@ -133,6 +137,41 @@ def test_an_export_refuses_a_number_out_of_range(name, values, message, new_hair
     label = getattr(bpy.ops.hairloom, f"export_{name}").get_rna_type().name
     with pytest.raises(RuntimeError, match=f"Error: {re.escape(label)}: {message}"):
         getattr(bpy.ops.hairloom, f"export_{name}")(**values)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("settle", {"seconds": 1.0e6}, "Settle: 'Time' is 1.*, .* from 0 to 60"),
+        ("grow", {"strand_count": -3}, "'Strands' is -3, "),
+        ("turntable", {"directory": "a", "frames": 0}, "turntable: frames cannot be 0"),
+        ("contact_sheet", {"filepath": "a.png", "size": 8}, "contact sheet: size cannot be 8"),
+    ],
+)
+def test_an_operator_refuses_a_number_out_of_range(name, values, message, new_hair, sphere):
+    select(sphere if name == "grow" else new_hair(sphere))
+    before = set(bpy.data.objects)
+    with pytest.raises(RuntimeError, match=f"Error: .*{message}"):
+        getattr(bpy.ops.hairloom, name)(**values)
+    assert set(bpy.data.objects) == before
+
+
+def test_blender_limits_only_numbers_without_an_upper_limit(extension):
+    """Blender would use the nearest valid number without a word. A factor or a tile below the
+    lowest one is as good as that one."""
+    clamped = {
+        (name, prop.identifier)
+        for name in dir(bpy.ops.hairloom)
+        for prop in getattr(bpy.ops.hairloom, name).get_rna_type().properties
+        if prop.type in UNLIMITED and (prop.hard_min, prop.hard_max) != UNLIMITED[prop.type]
+    }
+    assert clamped == {
+        ("card_width", "root"),
+        ("card_width", "tip"),
+        ("card_tile", "number"),
+        ("add_card_along_curve", "width"),
+        ("add_card_along_curve", "tile"),
+    }
 
 
 def properties():

@@ -37,6 +37,8 @@ LIGHTS = (
 )
 #: frame count and sides of pictures [pixels], min and max
 FRAME_LIMITS, SIDE_LIMITS = (1, 10_000), (16, 4096)
+#: sub-pixels along each side of a pixel, min and max
+SAMPLE_LIMITS = 1, 4
 #: height of the camera: z of a direction whose horizontal length is 1
 _CAMERA_Z = 0.14
 #: number of layers of the turning points, and number of corners of the circle around each
@@ -69,21 +71,29 @@ class TurntableSettings:
     frame_rate: float = 24.0
 
     def __post_init__(self) -> None:
-        sides = {"width": SIDE_LIMITS, "height": SIDE_LIMITS}
-        limits = {"frames": FRAME_LIMITS, **sides, "samples": (1, 4)}
-        for name, (low, high) in limits.items():
-            if not low <= getattr(self, name) <= high:
-                raise HairloomError(
-                    f"{name} cannot be {getattr(self, name)}",
-                    place="turntable",
-                    remedy=f"Use a number from {low} to {high}",
-                )
+        check_limit("turntable", "frames", self.frames, FRAME_LIMITS)
+        check_limit("turntable", "width", self.width, SIDE_LIMITS)
+        check_limit("turntable", "height", self.height, SIDE_LIMITS)
+        check_limit("turntable", "samples", self.samples, SAMPLE_LIMITS)
         if not 0.0 < self.frame_rate < np.inf:
             raise HairloomError(
                 f"a frame rate cannot be {self.frame_rate}",
                 place="turntable",
                 remedy="Use a number above 0, such as 24",
             )
+
+
+def check_limit(place: str, name: str, value: int, limits: tuple[int, int]) -> None:
+    """Check a number.
+
+    Raises:
+        HairloomError: it is out of its limits.
+    """
+    low, high = limits
+    if not low <= value <= high:
+        raise HairloomError(
+            f"{name} cannot be {value}", place=place, remedy=f"Use a number from {low} to {high}"
+        )
 
 
 @dataclass

@@ -179,13 +179,10 @@ SECTION_GROUPS["fin"].__annotations__ |= {
 }
 
 
-def operator_properties(section: str, *, clamps: bool = True) -> dict[str, Any]:
-    """The `__annotations__` of an operator that uses the settings of one section.
-
-    Args:
-        clamps: see `property_annotations`.
-    """
-    return property_annotations(ALL_SETTINGS[section].parameters(), clamps=clamps)
+def operator_properties(section: str) -> dict[str, Any]:
+    """The `__annotations__` of an operator that uses the settings of one section; `settings_of`
+    refuses a script's numbers that are out of range."""
+    return property_annotations(ALL_SETTINGS[section].parameters(), clamps=False)
 
 
 def _switch(section: str, parameter: str, values: tuple[str, str], name: str, text: str) -> Any:

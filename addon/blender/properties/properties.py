@@ -192,7 +192,8 @@ def _precision(parameter: Parameter) -> int:
 def _ranges(parameter: Parameter, clamps: bool) -> dict[str, float]:
     limits: dict[str, float] = {}
     hard = parameter.hard_range if clamps else None
-    for prefix, span in (("", hard), ("soft_", parameter.soft_range)):
+    soft = parameter.soft_range or parameter.hard_range
+    for prefix, span in (("", hard), ("soft_", soft)):
         if span is None:
             continue
         low, high = span
