@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from .cards.follow import (
 from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
+from .cards.steps import NamedSteps
 from .dynamics.figures import CardFigures
 from .dynamics.measure import are_outside, length_changes, strand_depths
 from .groom.weights import guide_weights
@@ -46,7 +47,7 @@ def card_build_steps(
     make_alpha: MakeAlpha = lambda _build: None,
     occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
-) -> Generator[str, None, CardBuild]:
+) -> NamedSteps[CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, sorted from inside to outside.
 
     Args:
@@ -54,7 +55,7 @@ def card_build_steps(
         occluders: cards of other grooms, which shade these, world space.
         edits: the artist's changes to cards made before, which are kept.
 
-    Yields the name of the next stage; returns the cards.
+    Yields what is being made; returns the cards.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.

@@ -30,7 +30,7 @@ from .shells import build_shells, wants_shells
 from .short_hair import fitted_to_length
 from .skin_clearance import lift_roots, raise_between_rows
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, order_steps, with_triangle_order
-from .steps import map_progress
+from .steps import NamedSteps, Step, named
 from .strand_shading import shading_from_strands
 from .strip import Strips, UncutCards, guide_strips, random_tiles, strip_mesh
 
@@ -130,8 +130,8 @@ def card_steps(
     make_alpha: MakeAlpha,
     other_occluders: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
-) -> Generator[str, None, CardBuild]:
-    """Build the cards; each step names what comes next, and the result is returned.
+) -> NamedSteps[CardBuild]:
+    """Build the cards; each step yields what is being made, and the result is returned.
 
     Args:
         other_occluders: cards of other grooms, which occlude these, world space.
@@ -144,7 +144,7 @@ def card_steps(
         return (
             yield from _shell_steps(groom, settings, atlas, occlusion, make_alpha, other_occluders)
         )
-    yield "Cards from strands"
+    yield Step("Cards from strands")
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     card = card_of_strand(groom, settings)
     cards, plan = uncut_cards(groom, settings, atlas, card)
@@ -153,7 +153,7 @@ def card_steps(
     record = CardRecord.of(cards.strips, cards.tile, cards.atlas, groom.head)
     if applied is not None:
         cards, record = applied.cards, applied.record
-    yield "Levels of detail"
+    yield Step("Levels of detail")
     error = None
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
@@ -169,14 +169,14 @@ def card_steps(
     build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes, record=record)
     if applied is not None:
         build = replace(build, edits=applied.counts, edit_notes=applied.notes)
-    yield "Atlas"
+    yield Step("Atlas")
     alpha = make_alpha(build)
     shading = _occlusion_steps(groom, card, build, alpha, other_occluders, occlusion, applied)
-    build = yield from _with_progress("Ambient occlusion", shading)
+    build = yield from named("Ambient occlusion", shading)
     finest = build.finest
     shaded = (finest, *(with_nearest_occlusion(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings, alpha)
-    yield "Check of the order"
+    yield Step("Check of the order")
     first = orders[0]
     wrong = wrong_fraction(
         finest,
@@ -203,9 +203,9 @@ def _shell_steps(
     occlusion: CardOcclusionSettings,
     make_alpha: MakeAlpha,
     other_occluders: Sequence[CardOccluder],
-) -> Generator[str, None, CardBuild]:
+) -> NamedSteps[CardBuild]:
     """The same for shells, whose order is known."""
-    yield "Shells from strands"
+    yield Step("Shells from strands")
     assert groom.head is not None
     made = build_shells(
         groom.strands,
@@ -222,14 +222,14 @@ def _shell_steps(
         meshes.append(level.mesh.with_occlusion(own.astype(np.float32)))
     errors = tuple(level.error for level in made.levels)
     build = CardBuild(tuple(meshes), made.back_triangles, errors, made.plan, settings.shell_layers)
-    yield "Atlas"
+    yield Step("Atlas")
     alpha = make_alpha(build)
     if other_occluders:
         for number, mesh in enumerate(meshes):
             rays = occlusion_steps(mesh, other_occluders, [], occlusion)
-            shade = yield from _with_progress("Ambient occlusion", rays)
+            shade = yield from named("Ambient occlusion", rays)
             meshes[number] = mesh.with_occlusion(mesh.occlusion * shade)
-    yield "Check of the order"
+    yield Step("Check of the order")
     finest = meshes[0]
     wrong = wrong_fraction(
         finest,
@@ -304,7 +304,7 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
 
 def _orders(
     levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings, alpha: Floats | None
-) -> Generator[str, None, list[CardOrders]]:
+) -> NamedSteps[list[CardOrders]]:
     """The orders of each level; coarser ones are sorted from fewer views."""
     sort_by = cast("SortBy", settings.order_by)
     orders = []
@@ -312,16 +312,8 @@ def _orders(
         view_count = _COARSER_VIEWS if number else VIEW_COUNT
         steps = order_steps(mesh, head, sort_by, view_count=view_count, alpha=alpha)
         name = f"Order of level {number}" if len(levels) > 1 else "Order"
-        orders.append((yield from _with_progress(name, steps)))
+        orders.append((yield from named(name, steps)))
     return orders
-
-
-def _with_progress[Result](
-    name: str, steps: Generator[float, None, Result]
-) -> Generator[str, None, Result]:
-    """Progress messages: the step's name, then its percentage."""
-    yield name
-    return (yield from map_progress(steps, lambda fraction: f"{name}, {100.0 * fraction:.0f} %"))
 
 
 def uncut_cards(

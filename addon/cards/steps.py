@@ -3,7 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import Any
+from typing import Any, NamedTuple
+
+
+class Step(NamedTuple):
+    """A step of named work. fraction: of it that is done; None: unknown."""
+
+    name: str
+    fraction: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The step for display, such as "Ambient occlusion, 20 %"."""
+        return self.name if self.fraction is None else f"{self.name}, {100 * self.fraction:.0f} %"
+
+
+#: Work that yields the step that begins or has advanced.
+type NamedSteps[Result] = Generator[Step, None, Result]
 
 
 def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
@@ -14,6 +30,12 @@ def result_of[Result](steps: Generator[Any, None, Result]) -> Result:
         except StopIteration as end:
             result: Result = end.value
             return result
+
+
+def named[Result](name: str, steps: Generator[float, None, Result]) -> NamedSteps[Result]:
+    """Work that yields the fraction that is done, as a step of this name."""
+    yield Step(name)
+    return (yield from map_progress(steps, lambda fraction: Step(name, fraction)))
 
 
 def map_progress[Step, Progress, Result](

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from ..blender.bakes.stale_bakes import stale_notes
 from ..blender.base.file_names import file_paths, file_stem, given_path, in_asset_folder
 from ..blender.base.objects import Handle, without_hidden
 from ..blender.base.outcome import Outcome, report
-from ..blender.cards.files import CardExport, CardOutput, FileSteps
+from ..blender.cards.files import CardExport, CardOutput
 from ..blender.preview.previews import previewed_rigs, previews
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
@@ -225,7 +226,7 @@ def _stale_bake_notes(
         return ()
 
 
-def _as_steps(writing: FileSteps[Outcome]) -> Steps[Outcome]:
+def _as_steps(writing: Generator[tuple[str, float | None], None, Outcome]) -> Steps[Outcome]:
     with closing(writing):
         while True:
             try:

@@ -72,12 +72,11 @@ class Report:
         return Progress(name, total, self._style)
 
     def steps(self, name: str) -> Callable[[str], None]:
-        """A function that prints each step of long work once, without its percentage."""
+        """A function that prints the name of each step of long work once."""
         shown = set[str]()
 
-        def show(text: str) -> None:
+        def show(step: str) -> None:
             raise_if_interrupted()
-            step = text.partition(",")[0]
             if step not in shown:
                 print(f"{name}: {step[:1].lower()}{step[1:]}", flush=True)
             shown.add(step)

@@ -30,7 +30,7 @@ from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.shell_plan import ShellPlan, shell_strands
-from ...cards.steps import map_progress, result_of
+from ...cards.steps import NamedSteps, Step, map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import resized_to_largest
 from ...light_flow import light_along_axes
@@ -200,8 +200,8 @@ class MappedCards:
 
 def build_steps(
     inputs: CardInputs, draw: AtlasDraw | None = None, stage: Stage = untimed
-) -> Generator[str, None, MappedCards]:
-    """Build cards with their maps; each step yields the name of the next stage.
+) -> NamedSteps[MappedCards]:
+    """Build cards with their maps; each step yields what is being made.
 
     Args:
         draw: draws the atlas; all other work can run in any thread. None: draw in this thread.
@@ -216,7 +216,7 @@ def build_steps(
             made.append(card_maps(inputs, build, draw or draw_maps))
         return made[-1].textures.alpha
 
-    yield "Other hair"
+    yield Step("Other hair")
     other_occluders, notes = inputs.occluders.cards()
     build = yield from card_build_steps(
         inputs.rig, inputs.settings, make_alpha, other_occluders, inputs.edits
@@ -235,7 +235,7 @@ def build_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
         return work.on_main_thread(draw_maps_steps(flat, size))
 
-    return result_of(map_progress(build_steps(inputs, draw), work.report))
+    return result_of(map_progress(build_steps(inputs, draw), lambda step: work.report(step.text)))
 
 
 def counts_line(cards: int, triangles: int, shell_layers: int) -> str:

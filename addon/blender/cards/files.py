@@ -19,7 +19,7 @@ from ...cards.card_mesh import CardMesh
 from ...cards.export_settings import CardExportSettings
 from ...cards.joints import CardTracks
 from ...cards.settings import CardSettings
-from ...cards.steps import map_progress, result_of
+from ...cards.steps import NamedSteps, Step, map_progress, named, result_of
 from ...cards.uv_fans import split_fans
 from ...cards.vertex_animation import motion_layout
 from ...dynamics.figures import CardFigures
@@ -116,9 +116,6 @@ _STRAND_SETTINGS = {"model", "color_source", "color_map", "brow_source", "brow_c
 _LONGEST_SUFFIX = "_motion_position.exr"
 _UNITS_OF_KINDS = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
-#: Yields the current stage, and the fraction of it that is done; None where that is unknown.
-type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
-
 
 @dataclass(frozen=True)
 class CardOutput:
@@ -168,7 +165,7 @@ def write_cards(
     output: CardOutput | None = None,
     stage: Stage = untimed,
     motion: GuideMotion | None = None,
-    on_step: Callable[[str], object] = lambda text: None,
+    on_step: Callable[[str], object] = lambda name: None,
 ) -> WrittenCards:
     """Build the cards of a rig and write them.
 
@@ -176,7 +173,7 @@ def write_cards(
         path: of the mesh; the textures go beside it as NAME_base.png and so on.
         stage: makes a context manager that times a named stage.
         motion: that of this rig; None: the cards are at rest.
-        on_step: called with what is being made, such as "Ambient occlusion, 20 %".
+        on_step: called with the name of what is being made, again whenever it has advanced.
 
     Raises:
         HairloomError: no cards, a format that cannot be written, or a folder that cannot be
@@ -185,10 +182,11 @@ def write_cards(
     output = output or CardOutput()
     check_output(path, output, motion)
     with stage("build cards"):
-        made = result_of(map_progress(build_steps(inputs, stage=stage), on_step))
+        building = build_steps(inputs, stage=stage)
+        made = result_of(map_progress(building, lambda step: on_step(step.name)))
     head = inputs.rig.head
     writing = file_steps(path, made, inputs.settings, output, stage, motion, head)
-    return result_of(map_progress(writing, lambda step: on_step(step[0])))
+    return result_of(map_progress(writing, lambda step: on_step(step.name)))
 
 
 def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> None:
@@ -247,7 +245,7 @@ def file_steps(
     stage: Stage = untimed,
     motion: GuideMotion | None = None,
     head: Surface | None = None,
-) -> FileSteps[WrittenCards]:
+) -> NamedSteps[WrittenCards]:
     """Write built cards; closing the generator leaves old files as they were.
 
     Args:
@@ -284,13 +282,13 @@ class _Writer:
     motion: Mapping[str, Any] = field(default_factory=dict)
     figures: CardFigures | None = None
 
-    def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
+    def steps(self, motion: GuideMotion | None) -> NamedSteps[tuple[str, ...]]:
         """Write everything; returns notes for the artist."""
         build = self.made.build
         parts = map(split_fans, build.levels, build.back_triangles)
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.settings.motion == "none":
-            yield "Writing", None
+            yield Step("Writing")
             return self._write(levels, backs)
         if self.output.settings.motion == "texture":
             return (yield from self._write_with_texture(levels, backs, motion))
@@ -298,19 +296,17 @@ class _Writer:
 
     def _write_with_skeleton(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
-    ) -> FileSteps[tuple[str, ...]]:
+    ) -> NamedSteps[tuple[str, ...]]:
         settings = self.output.settings
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
-            moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
+            moved = yield from named("Moving the cards", steps)
         kind, self.figures = settings.motion, moved.figures
         with self.stage(f"fit {kind}"):
-            skeleton = yield from map_progress(
-                self._fitting(moved.tracks, motion.rig.head),
-                lambda fraction: (f"Fitting {kind}", fraction),
-            )
+            fitting = self._fitting(moved.tracks, motion.rig.head)
+            skeleton = yield from named(f"Fitting {kind}", fitting)
         self.motion = skeleton.sidecar_section
-        yield "Writing", None
+        yield Step("Writing")
         return (*skeleton.notes, *self._write(levels, backs, skeleton=skeleton))
 
     def _fitting(
@@ -324,15 +320,15 @@ class _Writer:
 
     def _write_with_texture(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
-    ) -> FileSteps[tuple[str, ...]]:
+    ) -> NamedSteps[tuple[str, ...]]:
         settings = self.output.settings
         count = sum(len(mesh.positions) for mesh in levels)
         motion_layout(count, len(motion.frames), str(self.path))  # refused before the work
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space=settings.motion_space, with_directions=True)
-            moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
+            moved = yield from named("Moving the cards", steps)
         self.figures = moved.figures
-        yield "Writing", None
+        yield Step("Writing")
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
             self.motion = texture.sidecar_section(texture.write(self.path))
@@ -553,7 +549,7 @@ class CardExport:
         """Build the cards in a thread."""
         return self.cache.building(self.inputs, "hairloom card files")
 
-    def writing(self, made: MappedCards) -> FileSteps[Outcome]:
+    def writing(self, made: MappedCards) -> NamedSteps[Outcome]:
         """Write the built cards; closing the generator leaves old files as they were."""
         inputs = self.inputs
         self.cache.keep(self.hair, inputs, made)

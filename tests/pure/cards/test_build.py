@@ -320,10 +320,11 @@ def test_every_step_reports_its_progress() -> None:
     groom = card_flow.card_groom(rig)  # so that rays find the occlusion
     steps = list(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None))
     for name in ("Ambient occlusion", "Order of level 0", "Order of level 1"):
-        own = [step for step in steps if step.startswith(name)]
-        shares = [int(step.removeprefix(f"{name}, ").removesuffix(" %")) for step in own[1:]]
-        assert own[0] == name and len(shares) > 1
-        assert shares[0] > 0 and shares == sorted(shares) and shares[-1] <= 100
+        first, *others = [step for step in steps if step.name == name]
+        fractions = [step.fraction for step in others]
+        assert first.fraction is None and len(fractions) > 1
+        assert fractions[0] > 0.0 and fractions == sorted(fractions) and fractions[-1] <= 1.0
+        assert first.text == name and others[0].text.startswith(f"{name}, ")
 
 
 @pytest.mark.parametrize("by", ["pieces", "cards", "distance"])
