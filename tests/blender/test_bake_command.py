@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from hedgehogs import hedgehog
+from swinging import key_x
 
 from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes import playback
@@ -27,9 +28,7 @@ def file(new_hair, sphere, tmp_path):
     hair = new_hair(sphere)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (LAST, 0.2)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, LAST: 0.2})
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.dynamics.device = "numpy"
     path = tmp_path / "wig.blend"

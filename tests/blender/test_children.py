@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid, strand_grid
+from swinging import key_x
 
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.bakes import playback
@@ -47,9 +48,7 @@ def moving(hair, sphere, tmp_path):
     """`hair` on a head that moves."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (3, 0.1), (LAST, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, 3: 0.1, LAST: -0.05})
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")
     scene.frame_set(1)

@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 import pytest
 from strand_files import needs_usd
+from swinging import key_x
 from tiers import few_by_name
 
 from hairloom.addon.blender.scene import mesh_files
@@ -69,9 +70,7 @@ def exported(
 
     def export(suffix: str) -> tuple[Path, bytes]:
         new_hair(sphere)
-        for frame in (1, 3):
-            sphere.location.x = 0.1 * frame
-            sphere.keyframe_insert("location", frame=frame)
+        key_x(sphere, {frame: 0.1 * frame for frame in (1, 3)})
         path = tmp_path / f"sound.{suffix}"
         if suffix == "abc":
             bpy.ops.wm.alembic_export(filepath=str(path), start=1, end=3)

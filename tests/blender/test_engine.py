@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from swinging import key_x
 from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
@@ -164,9 +165,7 @@ def test_motion_blur_spreads_along_the_motion(engine_scene: Any, tmp_path: Path)
     engine_scene.render.film_transparent = True
     engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 16
     ball = add_ball(0.05)
-    for frame, x in ((1, -0.2), (3, 0.2)):
-        ball.location.x = x
-        ball.keyframe_insert("location", frame=frame)
+    key_x(ball, {1: -0.2, 3: 0.2})
     for curve in curves_of(ball):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
@@ -186,9 +185,7 @@ def test_stretched_time_is_stretched_once(engine_scene: Any, tmp_path: Path) -> 
     """Time remapping is applied once: a very short shutter gives the picture without blur."""
     engine_scene.hairloom.picture.samples = engine_scene.hairloom.picture.motion_steps = 2
     ball = add_ball(0.05)
-    for frame, x in ((1, -0.2), (21, 0.2)):
-        ball.location.x = x
-        ball.keyframe_insert("location", frame=frame)
+    key_x(ball, {1: -0.2, 21: 0.2})
     engine_scene.render.frame_map_old, engine_scene.render.frame_map_new = 100, 200
     engine_scene.frame_set(20)
     engine_scene.render.film_transparent = True

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grids import baked_grid
+from swinging import key_x
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -229,9 +230,7 @@ def test_hair_is_rendered_as_it_was_baked(
 
     hair = new_hair(sphere)
     engine_scene.frame_start, engine_scene.frame_end = 1, 4
-    for frame, x in ((1, -0.2), (4, 0.2)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: -0.2, 4: 0.2})
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.bake.folder = str(tmp_path / "bake")

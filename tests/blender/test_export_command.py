@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from grids import baked_grid
 from strand_files import needs_usd, read_usd_curves
+from swinging import key_x
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
@@ -207,9 +208,7 @@ def test_hair_of_the_scene_leaves_with_its_bake(
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")
-    for frame, x in ((1, 0.0), (4, 0.1)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, 4: 0.1})
     list(Bake.of([hair], bpy.context.scene, frames=range(1, 5)).steps())
     report = run("--object", "Hair", "--frames", "1", "4", output="out.usdc")
     _, curves = read_usd_curves(tmp_path / "out.usdc")

@@ -14,6 +14,7 @@ from typing import Any
 
 import bpy
 import pytest
+from swinging import key_x
 
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.cards.export_settings import CardExportSettings
@@ -50,9 +51,7 @@ def folder(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
     hair.data.hairloom.atlas.source = "made"
     (tmp_path / "scenes").mkdir()
     for number, name in enumerate(CHARACTERS, start=1):
-        for frame, x in ((1, 0.0), (FRAMES, 0.05 * number)):
-            sphere.location.x = x
-            sphere.keyframe_insert("location", frame=frame)
+        key_x(sphere, {1: 0.0, FRAMES: 0.05 * number})
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scenes" / f"{name}.blend"))
     script = tmp_path / "blender.sh"
     script.write_text(BLENDER)

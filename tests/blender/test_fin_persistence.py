@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from fin_motion import evaluated_vertices, play_frames, rest_vertices, start_fin, update_view_layer
+from swinging import key_x
 from undoing import redo, undo
 
 from hairloom.addon.blender.preview import fins, previews, scene_events
@@ -165,9 +166,7 @@ def frames_of(obj, frames):
 
 
 def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag_object, get_depsgraph, tmp_path):
-    for frame, x in ((1, 0.0), (10, 0.2)):
-        flag_object.location.x = x
-        flag_object.keyframe_insert("location", frame=frame)
+    key_x(flag_object, {1: 0.0, 10: 0.2})
     bpy.context.scene.frame_set(1)
     session = fins.start(flag_object, get_depsgraph())
     simulated = frames_of(flag_object, range(1, 9))

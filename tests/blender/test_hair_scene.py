@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from swinging import key_x
 from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
@@ -378,9 +379,7 @@ def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
 ) -> None:
     """Without its head, hair has the same alpha as in our own engine, in every sample."""
     cycles.frame_start, cycles.frame_end = 1, 3
-    for frame, x in ((1, -0.1), (3, 0.1)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: -0.1, 3: 0.1})
     cycles.frame_set(1)
     if is_baked:
         hairy.hairloom.dynamics.collider_resolution = 8

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grids import baked_grid, strand_grid
 from selecting import select
-from swinging import FRAME_S, tips_lag
+from swinging import FRAME_S, key_x, tips_lag
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
@@ -406,9 +406,7 @@ def test_an_animated_wind_blows_hair_in_playback_and_in_a_bake(
     else:
         source = bpy.data.objects.new("Source", None)
         scene.collection.objects.link(source)
-        for frame, x in ((1, 0.0), (3, 40.0)):
-            source.location.x = x
-            source.keyframe_insert("location", frame=frame)
+        key_x(source, {1: 0.0, 3: 40.0})
         driven(hair, path, source)
     frames(scene, 6)
     blown = strand_grid(session)

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from swinging import key_x
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.bakes.simulation import differences
@@ -144,9 +145,7 @@ def test_painted_hair_moves_differently(hair: Any, sphere: Any, get_depsgraph: A
     """Stiff above and limp below, on a head that moves sideways."""
     scene, dynamics = bpy.context.scene, hair.hairloom.dynamics
     scene.frame_start, scene.frame_end = 1, 8
-    for frame, x in ((1, 0.0), (5, 0.2)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, 5: 0.2})
     paint("group", hair, sphere)
     scene.frame_set(1)
     ends = []

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid, strand_grid
+from swinging import key_x
 from tiers import few_in_commits
 from undoing import undo
 
@@ -38,9 +39,7 @@ def scene(new_hair, sphere, tmp_path):
     new_hair(sphere)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, -0.2), (LAST, 0.2)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: -0.2, LAST: 0.2})
     sphere.hide_render = True
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.type, camera.data.ortho_scale = "ORTHO", 0.8
@@ -268,9 +267,7 @@ def fin(extension, tmp_path):
     add_modifier(flag)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (LAST, 0.3)):
-        flag.location.x = x
-        flag.keyframe_insert("location", frame=frame)
+    key_x(flag, {1: 0.0, LAST: 0.3})
     scene.frame_set(1)
     return flag
 

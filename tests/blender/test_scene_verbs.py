@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from sorting import sort_mesh
+from swinging import key_x
 
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides
 from hairloom.addon.blender.cards.adopt import SortOptions
@@ -684,9 +685,7 @@ def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
     """Exported roots follow the animated object."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair = bpy.data.objects["Hair"]
-    for frame in (1, 30):
-        hair.location.x = 0.0005 * frame
-        hair.keyframe_insert("location", frame=frame)
+    key_x(hair, {frame: 0.0005 * frame for frame in (1, 30)})
     bpy.context.scene.frame_set(1)
     bpy.ops.wm.save_mainfile()
     roots = {}

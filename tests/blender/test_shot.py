@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from swinging import key_x
 from tiers import few_in_commits
 
 from hairloom.addon import motion_flow
@@ -190,9 +191,7 @@ def test_a_bake_applies_all_shot_settings(new_hair, sphere, tmp_path):
     for name, value in SOFT.items():
         setattr(settings, name, value)
     settings.device, settings.pre_roll = "numpy", 6
-    for frame, place in ((3, 0.0), (4, 6.0)):
-        sphere.location.x = place
-        sphere.keyframe_insert("location", index=0, frame=frame)
+    key_x(sphere, {3: 0.0, 4: 6.0})
     for frame, scale in ((5, 1.0), (6, 0.0)):
         settings.time_scale = scale
         hair.keyframe_insert("hairloom.dynamics.time_scale", frame=frame)

@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid
+from swinging import key_x
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.guide_motion import BakedGuides
@@ -28,9 +29,7 @@ def baked(new_hair: Any, sphere: Any, tmp_path: Path) -> tuple[Any, Any]:
     """Baked hair on a head that moves; the current frame is 2."""
     hair, scene = new_hair(sphere), bpy.context.scene
     scene.frame_start, scene.frame_end = 1, LAST
-    for frame, x in ((1, 0.0), (LAST, 0.1)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, LAST: 0.1})
     hair.hairloom.dynamics.collider_resolution = 8
     hair.hairloom.dynamics.device = "numpy"
     hair.hairloom.bake.folder = str(tmp_path / "bake")

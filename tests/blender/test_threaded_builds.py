@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import strand_grid
+from swinging import key_x
 from waiting import run_steps_until, wait_until, wait_until_playing
 
 from hairloom.addon import light_flow, motion_flow, rig_flow
@@ -553,9 +554,7 @@ def moving(sphere):
     """A head that shakes from frame 1 to 12."""
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 12
-    for frame, x in ((1, 0.0), (5, 0.1), (12, -0.05)):
-        sphere.location.x = x
-        sphere.keyframe_insert("location", frame=frame)
+    key_x(sphere, {1: 0.0, 5: 0.1, 12: -0.05})
     scene.frame_set(1)
 
 
