@@ -1,8 +1,8 @@
 """The arrays of a mesh: its vertices, its edges, the corners of its faces, its triangles.
 
-Attributes are copied whole. The collections `vertices`, `edges` and `loops` convert each element,
-which takes a hundred times as long; they are read where the attribute is missing: in Edit Mode, and
-where a mesh has no elements.
+Attributes are copied whole. The collections `vertices`, `edges`, `loops` and `loop_triangles`
+convert each element, which takes a hundred times as long; they are read where there is no
+attribute: in Edit Mode, where a mesh has no elements, and for triangles of larger faces.
 """
 
 from __future__ import annotations
@@ -41,25 +41,32 @@ def corner_vertices(mesh: bpy.types.Mesh) -> Ints:
     return vertices
 
 
-def triangle_corners(mesh: bpy.types.Mesh, property_name: str = "vertices") -> Ints:
-    """The mesh's triangles, (triangle_count, 3) int32.
-
-    Args:
-        property_name: "vertices", or "loops": the corners of faces.
-    """
-    mesh.calc_loop_triangles()
-    numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get(property_name, numbers.ravel())
-    return numbers
+def triangle_polygons(mesh: bpy.types.Mesh) -> Ints:
+    """The face that each triangle is a part of, (triangle_count,) int32."""
+    faces = np.empty(len(mesh.loop_triangle_polygons), np.int32)
+    mesh.loop_triangle_polygons.foreach_get("value", faces)
+    return faces
 
 
-def triangle_indices(mesh: bpy.types.Mesh, property_name: str) -> Ints:
-    """An index that each triangle has, (triangle_count,) int32.
+def triangle_corners(mesh: bpy.types.Mesh) -> Ints:
+    """The corners of faces at which each triangle lies, (triangle_count, 3) int32."""
+    faces = triangle_polygons(mesh)
+    if np.array_equal(faces, np.arange(len(mesh.polygons))):  # all faces are triangles
+        return np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3)
+    corners = np.empty((len(faces), 3), np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners.ravel())
+    return corners
 
-    Args:
-        property_name: "polygon_index" or "material_index".
-    """
-    mesh.calc_loop_triangles()
-    numbers = np.empty(len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get(property_name, numbers)
-    return numbers
+
+def triangle_vertices(mesh: bpy.types.Mesh) -> Ints:
+    """The vertices of each triangle, (triangle_count, 3) int32."""
+    return corner_vertices(mesh)[triangle_corners(mesh)]
+
+
+def triangle_materials(mesh: bpy.types.Mesh) -> Ints:
+    """The material slot of each triangle, (triangle_count,) int32."""
+    slots: Ints | None = read_attribute(mesh, "material_index", "FACE")
+    if slots is None:
+        slots = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("material_index", slots)
+    return slots[triangle_polygons(mesh)]

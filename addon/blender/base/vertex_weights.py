@@ -12,7 +12,7 @@ from ...arrays import Floats, Ints, means_by
 from ...errors import HairloomError
 from ...shading.luminance import LUMINANCE
 from .attributes import read_attribute
-from .mesh_arrays import triangle_corners, triangle_indices
+from .mesh_arrays import triangle_corners, triangle_polygons, triangle_vertices
 from .objects import as_mesh
 
 #: Attributes that may be painted; colours count by their luminance.
@@ -89,7 +89,7 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
         values, domain = weights_on(obj, mesh, name)
         if domain == "POINT":
             return values
-        corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh)
+        corners, triangles = at_corners(mesh, values, domain), triangle_vertices(mesh)
         count = len(mesh.vertices)
     return means_by(triangles.ravel(), corners.ravel(), count).astype(np.float32)
 
@@ -133,10 +133,10 @@ def painted_attribute(
 def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
     """Values at the corners of the mesh's triangles, (triangle_count, 3)."""
     if domain == "POINT":
-        return values[triangle_corners(mesh)]
+        return values[triangle_vertices(mesh)]
     if domain == "CORNER":
-        return values[triangle_corners(mesh, "loops")]
-    return np.repeat(values[triangle_indices(mesh, "polygon_index")][:, None], 3, axis=1)
+        return values[triangle_corners(mesh)]
+    return np.repeat(values[triangle_polygons(mesh)][:, None], 3, axis=1)
 
 
 def set_vertex_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:

@@ -25,7 +25,12 @@ from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
-from ..base.mesh_arrays import corner_vertices, triangle_corners, triangle_indices, vertex_positions
+from ..base.mesh_arrays import (
+    corner_vertices,
+    triangle_corners,
+    triangle_polygons,
+    vertex_positions,
+)
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weights_on
 from ..scene.surfaces import (
@@ -204,11 +209,11 @@ def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
     """A mesh's triangles.
 
     Returns:
-        vertex positions (n, 3) float32 in the mesh's own space, and the vertices (m, 3), loops
+        vertex positions (n, 3) float32 in the mesh's own space, and the vertices (m, 3), corners
         (m, 3) and polygon (m,) of each triangle, int32.
     """
-    triangles, loops = triangle_corners(mesh), triangle_corners(mesh, "loops")
-    return vertex_positions(mesh), triangles, loops, triangle_indices(mesh, "polygon_index")
+    corners = triangle_corners(mesh)
+    return vertex_positions(mesh), corner_vertices(mesh)[corners], corners, triangle_polygons(mesh)
 
 
 def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:

@@ -12,7 +12,12 @@ from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
 from ...strands.affine import transform_points
 from ...strands.vectors import unit
-from ..base.mesh_arrays import corner_vertices, triangle_corners, triangle_indices, vertex_positions
+from ..base.mesh_arrays import (
+    corner_vertices,
+    triangle_corners,
+    triangle_materials,
+    vertex_positions,
+)
 from ..scene.mesh_materials import MeshMaterial, material_of
 from ..scene.surfaces import read_corner_uv
 
@@ -44,7 +49,8 @@ def read_meshes(
 def _split_by_material(
     mesh: bpy.types.Mesh, obj: bpy.types.Object, matrix: Floats, is_head: bool
 ) -> tuple[MeshSnapshot, ...]:
-    triangles, positions, normals = _corners(mesh)
+    corners = triangle_corners(mesh)
+    triangles, positions, normals = _geometry(mesh, corners)
     # multiplied from the right, as normals transform by the inverse transpose
     from_world = np.linalg.pinv(matrix[:3, :3])
     positions = transform_points(positions, matrix)
@@ -53,9 +59,9 @@ def _split_by_material(
     normals = unit(normals @ from_world.astype(np.float32))
     slots: Ints = np.zeros(len(triangles), np.int32)
     if len(obj.material_slots) > 1:
-        slots = triangle_indices(mesh, "material_index")
+        slots = triangle_materials(mesh)
     meshes = []
-    corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
+    corner_uv = read_corner_uv(mesh, corners)
     is_skin = is_head and corner_uv is not None
     head = Surface(positions, triangles, corner_uv) if is_skin else None
     for slot in np.unique(slots):
@@ -69,16 +75,16 @@ def _split_by_material(
     return tuple(meshes)
 
 
-def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
+def _geometry(mesh: bpy.types.Mesh, corners: Ints) -> tuple[Ints, Floats, Floats]:
     """Triangles, positions and normals; split normals split vertices."""
-    positions = vertex_positions(mesh)
+    positions, vertices = vertex_positions(mesh), corner_vertices(mesh)
     if mesh.normals_domain == "POINT":
         normals = np.empty_like(positions)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
-        return triangle_corners(mesh), positions, normals
+        return vertices[corners], positions, normals
     normals = np.empty((len(mesh.loops), 3), np.float32)
     mesh.corner_normals.foreach_get("vector", normals.ravel())
-    return triangle_corners(mesh, "loops"), positions[corner_vertices(mesh)], normals
+    return corners, positions[vertices], normals
 
 
 def _material(obj: bpy.types.Object, slot: int) -> MeshMaterial:

@@ -26,7 +26,7 @@ from ...groom.masks import (
 from ...params import Settings
 from ...shading.luminance import LUMINANCE
 from ...strands import StrandSet, Surface
-from ..base.mesh_arrays import triangle_corners
+from ..base.mesh_arrays import triangle_vertices
 from ..base.vertex_weights import (
     VertexGroupWeights,
     at_corners,
@@ -52,7 +52,7 @@ class _VertexGroups:
     @classmethod
     def of(cls, surface: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Self:
         with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
-            return cls(VertexGroupWeights.of(mesh), triangle_corners(mesh))
+            return cls(VertexGroupWeights.of(mesh), triangle_vertices(mesh))
 
     def at_corners(self, index: int) -> Floats:
         """The weights in one group, (triangle_count, 3)."""

@@ -74,9 +74,8 @@ def painted_colors(
             remedy="Set Surface in its Data properties, or clear Colour Map",
         )
     with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
-        mesh.calc_loop_triangles()
         colors = _of_attribute(mesh, name, surface.name) or _of_image(mesh, name, surface.name)
-        mesh_triangle_count = len(mesh.loop_triangles)
+        mesh_triangle_count = len(mesh.loop_triangle_polygons)
     if colors is None:
         raise _missing(surface, name)
     if mesh_triangle_count != triangle_count:
@@ -131,7 +130,7 @@ def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor |
 def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     if name not in image_names():
         return None
-    corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
+    corner_uv = read_corner_uv(mesh, triangle_corners(mesh))
     image = checked_image(name, corner_uv, place, instead="a colour attribute")
     assert corner_uv is not None
     (width, height), channels = image.size, image.channels

@@ -22,7 +22,7 @@ from ..base.attributes import read_attribute
 from ..base.mesh_arrays import (
     corner_vertices,
     triangle_corners,
-    triangle_indices,
+    triangle_materials,
     vertex_positions,
 )
 from ..base.objects import as_mesh
@@ -67,21 +67,19 @@ def read_surface(
         HairloomError: not a mesh, no faces, or no UVs where they are needed.
     """
     with evaluated_mesh(obj, depsgraph, place) as mesh:
-        loops = triangle_corners(mesh, "loops")
-        if not len(loops):
+        corners = triangle_corners(mesh)
+        if not len(corners):
             raise HairloomError(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
             )
-        # faster than the vertices of loop triangles, which are not stored as an array
-        triangles = corner_vertices(mesh)[loops]
-        corner_uv = read_corner_uv(mesh, loops)
+        corner_uv = read_corner_uv(mesh, corners)
         if corner_uv is None and need_uv:
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
                 place=place,
                 remedy="Unwrap it (Edit Mode, UV > Unwrap), or omit --strict",
             )
-        surface = Surface(vertex_positions(mesh), triangles, corner_uv)
+        surface = Surface(vertex_positions(mesh), corner_vertices(mesh)[corners], corner_uv)
     return _cache.shared(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
 
 
@@ -174,7 +172,7 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
         HairloomError: not a mesh.
     """
     with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
-        return triangle_indices(mesh, "material_index")
+        return triangle_materials(mesh)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...rig_flow import Solids
 from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts
 from ..bakes.simulation import CLOTH_VERSION, Arrays, hashes
-from ..base.mesh_arrays import triangle_corners
+from ..base.mesh_arrays import triangle_vertices
 from ..base.objects import Body, matrix_of, objects_in
 from ..base.vertex_weights import read_weights
 from ..colliders.scene_colliders import SceneColliders
@@ -96,7 +96,7 @@ class FinSession:
         self.rest(depsgraph)
         mesh = ClothMesh(
             self._carried,
-            triangle_corners(obj.data),
+            triangle_vertices(obj.data),
             self._pins(obj, depsgraph),
             loose_edges_of(obj.data),
         )
