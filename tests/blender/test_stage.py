@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import argparse
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import bpy
 import numpy as np
@@ -12,7 +14,7 @@ import pytest
 
 from hairloom.addon import rig_flow
 from hairloom.addon.blender.base.images import read_texture
-from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.command_line import command_line, demo_job
 from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.pictures.studio import Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
@@ -25,6 +27,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.params import SettingsMap
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.stage_settings import StageSettings
@@ -95,6 +98,24 @@ def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:
     for scale in (1e-3, 1e3):
         away = np.abs(pictures[scale] - pictures[1.0])[is_seen]
         assert away.mean() < 0.005, f"at {scale:g}: {away.mean():.4f}"
+
+
+def test_the_close_up_of_the_demo_is_lit_as_its_still(
+    head: Surface, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Its camera looks down from another side, and the lights stay."""
+    studio = studio_of(half_a_head(head), head)
+    lit_from: list[list[tuple[float, ...]]] = []
+
+    def draw(_: Studio, snapshot: Snapshot, *arguments: object) -> np.ndarray:
+        lit_from.append([tuple(light.vector) for light in snapshot.lights])
+        return np.zeros((SIZE, SIZE, 4), np.float32)
+
+    monkeypatch.setattr(Studio, "_draw", draw)
+    job = MagicMock(options=argparse.Namespace(width=SIZE, height=SIZE, samples=1))
+    still(studio)
+    demo_job._write_close_up(job, tmp_path / "close_up.png", studio, studio._rig)
+    assert len(lit_from[0]) == 3 and lit_from[1] == lit_from[0]
 
 
 @pytest.mark.slow

@@ -46,6 +46,8 @@ def demo(job: Job) -> None:
 
 
 def _write_close_up(job: Job, path: Path, studio: Studio, rig: Rig) -> None:
+    """Write a picture of the hair close by, lit as in the still: attached to a camera that looks
+    down, the light from behind would graze the crown, where roots mirror it."""
     options = job.options
     camera = studio.close_up(options.width / options.height)
     with job.report.stage("draw close-up"):
@@ -56,6 +58,7 @@ def _write_close_up(job: Job, path: Path, studio: Studio, rig: Rig) -> None:
             options.height,
             options.samples,
             camera,
+            lights=studio.lights(),
         )
     studio.write(path, picture)
     job.report.add_output(path)

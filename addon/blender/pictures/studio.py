@@ -190,11 +190,15 @@ class Studio:
     def stage(self) -> StageSettings:
         return self.settings[StageSettings]
 
-    def lights(self, camera: Camera) -> tuple[Light, ...]:
+    def lights(self, camera: Camera | None = None) -> tuple[Light, ...]:
         """The lights of the stage, around the groom at rest, attached to a camera.
 
         They are mirrored so that the main light is on the side of the hair that the camera sees.
+
+        Args:
+            camera: None: the studio's own.
         """
+        camera = camera or self._camera(1.0)
         front, eye = self.side.front, np.linalg.inv(camera.view)[:3, 3] - self._ball.center
         is_mirrored = bool(front[0] * eye[1] - front[1] * eye[0] < 0.0)
         return stage_lights(self.stage, camera.view, self._ball, is_mirrored=is_mirrored)
@@ -256,7 +260,7 @@ class Studio:
             self._rest_snapshot,
             points=points,
             meshes=self.meshes(pose),
-            lights=self.lights(self._camera(1.0)),
+            lights=self.lights(),
         )
 
     def card_picture(
@@ -287,7 +291,7 @@ class Studio:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about shadows in the studio's light, and about materials of the head."""
-        lights = self.lights(self._camera(1.0))
+        lights = self.lights()
         snapshot = self._rest_snapshot
         return (
             *shadow_warnings(lights, HairBall().ball(snapshot), snapshot.volume),
