@@ -16,6 +16,7 @@ from .drawing import draw_button
 from .help import WithHelp
 from .long_work import LongWork, Steps, draw_progress, steps_of_parts
 from .selection import active_mesh, in_object_mode, target_hair
+from .texts import translated
 
 _MILLIMETRES = 1000.0
 
@@ -121,7 +122,8 @@ def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     column.prop(hair.hairloom, "collider_collection")
     solid = hair.hairloom.collider or (head_of(hair) if hair.type == "CURVES" else None)
     if solid is not None:
-        column.prop(solid.hairloom, "collider_shape", text=f"{solid.name} As")
+        text = translated("{name} As", name=solid.name)
+        column.prop(solid.hairloom, "collider_shape", text=text, translate=False)
     if draw_progress(layout, HAIRLOOM_OT_fit_spheres):
         return
     row = layout.row(align=True)

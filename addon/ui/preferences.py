@@ -17,6 +17,7 @@ from ..blender.sessions.solvers import compute_problem
 from ..blender.setup.self_test import last_report
 from .menus import draw_shortcuts
 from .messages import draw_message
+from .texts import translated
 
 #: the extension's package by Blender's name, above this one
 ROOT_PACKAGE = __package__.rpartition(".addon")[0]
@@ -130,12 +131,12 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
 
 def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the GPU, and the results of the last self-test."""
-    info = gpu_info()
-    for name, value in info.items():
-        layout.label(text=f"{name.capitalize()}: {value or 'none'}")
+    for line in _gpu_lines():
+        layout.label(text=line, translate=False)
     problem = compute_problem()
-    text = f"Simulates on the CPU: {problem}" if problem else "Simulates on the GPU"
-    layout.label(text=text, icon="INFO" if problem else "CHECKMARK")
+    on_cpu = translated("Simulates on the CPU: {problem}", problem=_compute_problem(problem))
+    text = on_cpu if problem else translated("Simulates on the GPU")
+    layout.label(text=text, icon="INFO" if problem else "CHECKMARK", translate=False)
     row = layout.row(align=True)
     row.operator("hairloom.self_test", icon="CHECKMARK")
     row.operator("hairloom.copy_report", text="", icon="COPYDOWN")
@@ -145,6 +146,21 @@ def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
             draw_message(layout, context, f"{check.name}: {check.text}", icon)
         else:
             layout.label(text=f"{check.name}: {check.text}", icon=icon)
+
+
+def _gpu_lines() -> tuple[str, str, str]:
+    info = {name: value or translated("none") for name, value in gpu_info().items()}
+    return (
+        translated("Backend: {backend}", backend=info["backend"]),
+        translated("Renderer: {renderer}", renderer=info["renderer"]),
+        translated("Driver: {driver}", driver=info["driver"]),
+    )
+
+
+def _compute_problem(problem: str) -> str:
+    """The problem that occurs without a fault of a GPU; others are errors, as it reports them."""
+    texts = {"Blender runs without a GPU": translated("Blender runs without a GPU")}
+    return texts.get(problem, problem)
 
 
 def preferences(context: bpy.types.Context) -> Any:

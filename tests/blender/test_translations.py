@@ -21,7 +21,9 @@ from hairloom.addon.blender.strands import growing
 from hairloom.addon.cards import build as card_build
 from hairloom.addon.ui import (
     operators_bake,
+    operators_colliders,
     operators_grow,
+    preferences,
     preset_chooser,
     state,
     texts,
@@ -97,6 +99,24 @@ def test_state_counts_and_names_of_presets_are_in_the_language(language, new_hai
     for section in preset_chooser.KINDS:
         for entry in presets.shipped_presets(section):
             assert (TRANSLATION_CONTEXT, entry.title) in table
+
+
+@pytest.mark.parametrize("language", translations.tables())
+def test_facts_of_the_machine_and_its_colliders_are_in_the_language(
+    language, new_hair, sphere, monkeypatch
+):
+    table = translations.tables()[language]
+    monkeypatch.setattr(texts, "pgettext_iface", lambda text, context: table[context, text] + "!")
+    nothing = dict.fromkeys(("backend", "renderer", "driver"), "")
+    monkeypatch.setattr(preferences, "gpu_info", lambda: nothing)
+    monkeypatch.setattr(preferences, "compute_problem", lambda: "Blender runs without a GPU")
+    layout = Layout([])
+    preferences.draw_machine(layout, bpy.context)
+    assert [text.count("!") for text, _ in layout.texts][:4] == [2, 2, 2, 2], layout.texts
+    layout = Layout([])
+    operators_colliders.draw_colliders(layout, new_hair(sphere))
+    as_what = table[TRANSLATION_CONTEXT, "{name} As"].format(name=sphere.name) + "!"
+    assert as_what in [text for text, _ in layout.texts]
 
 
 @pytest.mark.parametrize("language", translations.tables())
