@@ -18,6 +18,9 @@ from hairloom.addon.ui import long_work
 
 #: strands of the groom that grows again
 STRANDS = 20_000
+#: faces along each side of a cloth
+FACES = 100
+_FRAME = 1.0 / 24.0
 _LOOK = 0.01
 
 
@@ -77,10 +80,30 @@ def _sample_scene() -> None:
     bpy.ops.hairloom.sample_scene(skin="light")
 
 
+def _play_cloth() -> None:
+    _clear()
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=FACES, y_subdivisions=FACES, size=0.2)
+    bpy.ops.hairloom.fin_add()
+    long_work._run_blocking(_cloth_steps())
+
+
+def _cloth_steps() -> long_work.Steps[None]:
+    """Preview cloth and play it, until its first frame."""
+    bpy.ops.hairloom.fin_preview()
+    yield long_work.Progress("previewed")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    previews.play(depsgraph, blocking=False)
+    while previews.waiting_names():
+        yield long_work.Progress("Making the cloth", is_idle=True)
+        previews.advance(depsgraph, _FRAME)
+    previews.stop_all()
+
+
 JOBS: dict[str, Callable[[], Any]] = {
     "add_hairstyle": _add_hairstyle,
     "make_real": lambda: bpy.ops.hairloom.make_real(),
     "add_groom": _add_groom,
     "grow_again": _grow_again,
     "sample_scene": _sample_scene,
+    "play_cloth": _play_cloth,
 }
