@@ -57,7 +57,7 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
         if not _can_make_cards(cls, context):
             return False
         if not card_objects(target_hair(context)[0]):
-            cls.poll_message_set("There are no cards yet")
+            cls.poll_message_set("There are no cards yet: press Make Cards first")
             return False
         return True
 

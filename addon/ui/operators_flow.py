@@ -110,7 +110,7 @@ class HAIRLOOM_OT_revert_flow(RevertShapeOperator, bpy.types.Operator):
     bl_label = "Revert Flow"
     bl_options = {"REGISTER", "UNDO"}
     backup = BEFORE_FLOW
-    disabled_text = "The selected hair was not combed along strokes: press Comb Along Flow"
+    disabled_text = "The selected hair was not combed along strokes: press Comb Along Flow first"
     change = "followed strokes"
 
 

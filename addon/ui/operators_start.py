@@ -173,7 +173,7 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         mesh = active_mesh(context)
         if mesh is not None and hair_systems(mesh):
             return True
-        cls.poll_message_set("The active mesh has no particle hair")
+        cls.poll_message_set("Select a mesh that has particle hair")
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:

@@ -101,7 +101,7 @@ class HAIRLOOM_OT_revert_trim(RevertShapeOperator, bpy.types.Operator):
     bl_label = "Revert Trim"
     bl_options = {"REGISTER", "UNDO"}
     backup = BEFORE_TRIM
-    disabled_text = "The selected hair is not trimmed: press Trim to Shape"
+    disabled_text = "The selected hair is not trimmed: press Trim to Shape first"
     change = "was trimmed"
 
 

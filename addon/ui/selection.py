@@ -99,7 +99,9 @@ def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -
     """For `poll`: whether hair curves are selected; the greyed-out button says so."""
     if target_hair(context):
         return True
-    operator.poll_message_set("Select hair curves first (Add > Curve > Empty Hair, or import some)")
+    operator.poll_message_set(
+        "Select hair curves first, or add some: Add > Curve > Hairloom Hairstyle"
+    )
     return False
 
 

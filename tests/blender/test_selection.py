@@ -33,6 +33,27 @@ def hair(new_hair, sphere):
     return hair
 
 
+@pytest.mark.parametrize(
+    ("name", "has_hair", "remedy"),
+    [
+        (
+            "settle",
+            False,
+            "Select hair curves first, or add some: Add > Curve > Hairloom Hairstyle",
+        ),
+        ("convert_particles", False, "Select a mesh that has particle hair"),
+        ("discard_card_edits", True, "press Make Cards first"),
+        ("revert_trim", True, "press Trim to Shape first"),
+        ("revert_flow", True, "press Comb Along Flow first"),
+    ],
+)
+def test_a_button_that_is_greyed_out_says_what_to_do(name, has_hair, remedy, new_hair):
+    if has_hair:
+        select(new_hair())
+    with pytest.raises(RuntimeError, match=remedy):
+        getattr(bpy.ops.hairloom, name)()
+
+
 def test_an_object_that_was_just_removed_is_no_obstacle(hair, sphere):
     layer = bpy.context.view_layer
     assert objects_in(layer) == [sphere, hair]
