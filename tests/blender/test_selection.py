@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import bpy
 import pytest
 from panel_layout import Layout
+from selecting import select
 
 from hairloom.addon.blender.base.objects import objects_in
 from hairloom.addon.blender.cards.occluders import read_occluders
