@@ -202,16 +202,7 @@ def plan_shells(
     patch_of_root = patches.nearest_patch(roots)
     density = _median_density(patches, patch_of_root)
     step = _thin_steps(patches, patch_of_root, density)
-    whole = np.flatnonzero(step == 0)
-    whole = whole if len(whole) else np.arange(len(step))
-    _, chosen = k_medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
-    features = patches.features[whole[chosen]]
-    source = list(whole[chosen])
-    thinned_pattern = None
-    if (step > 0).any():
-        gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
-        thinned_pattern = int(np.bincount(gap.argmin(axis=1)).argmax())
-        source += [source[thinned_pattern]] * len(_THIN_DENSITIES)
+    features, source, thinned_pattern = _chosen_patches(patches, step, random)
     half_side = 1.02 * float(np.quantile(patches.extent, 0.95))
     length = strands.lengths()
     covers = 2.0 * radius.mean(axis=1) * length
@@ -224,15 +215,14 @@ def plan_shells(
         for p, patch in enumerate(source)
     ]
     used = np.concatenate([each.strand for each in tile_strands])
-    pattern = np.repeat(np.arange(len(tile_strands)), [len(each.strand) for each in tile_strands])
-    width_factors = [
-        pattern_hair.cover[p]
-        / _visible_cover(patches, np.flatnonzero(pattern_of_patch == p), half_side, each, covers)
+    pattern = np.repeat(np.arange(len(source)), [len(each.strand) for each in tile_strands])
+    visible_cover = [
+        _visible_cover(patches, np.flatnonzero(pattern_of_patch == p), half_side, each, covers)
         for p, each in enumerate(tile_strands)
     ]
-    thickness = _WIDTH_FACTOR * settings.strand_width * np.array(width_factors)
+    thickness = _WIDTH_FACTOR * settings.strand_width * (pattern_hair.cover / visible_cover)
     texel = 2.0 * float(np.median(radius[used].mean(axis=1))) * thickness[0] / _STRAND_TEXELS
-    fitted = _fitted_settings(settings, layers * len(tile_strands), 2.0 * half_side / texel)
+    fitted = _fitted_settings(settings, layers * len(source), 2.0 * half_side / texel)
     texels = _STRAND_TEXELS * fitted.inner_tile[0] * texel / (2.0 * half_side)
     return ShellPlan(
         grid=fitted.grid,
@@ -243,9 +233,7 @@ def plan_shells(
         thinned_pattern=thinned_pattern,
         center=patches.center[source],
         axes=patches.axes[source],
-        reach=np.array(
-            [np.quantile(length[used][pattern == p], 0.9) for p in range(len(tile_strands))]
-        ),
+        reach=np.array([np.quantile(length[used][pattern == p], 0.9) for p in range(len(source))]),
         strands=used,
         pattern=pattern,
         shift=np.concatenate([each.shift for each in tile_strands]),
@@ -255,6 +243,29 @@ def plan_shells(
         is_flat=float(np.median(patches.features[:, 1])) < 2.0 * _MAX_FLAT_SINE,
         notes=_notes(texels),
     )
+
+
+def _chosen_patches(
+    patches: Patches, step: Ints, random: np.random.Generator
+) -> tuple[Floats, list[int], int | None]:
+    """What the patterns show.
+
+    Args:
+        step: see `_thin_steps`.
+
+    Returns:
+        the features of the patterns of full hair; the patch that each pattern shows, those of the
+        thinner ones last; and the pattern that these derive from, or None.
+    """
+    whole = np.flatnonzero(step == 0)
+    whole = whole if len(whole) else np.arange(len(step))
+    _, chosen = k_medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
+    features, source = patches.features[whole[chosen]], list(whole[chosen])
+    if not (step > 0).any():
+        return features, source, None
+    gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
+    thinned_pattern = int(np.bincount(gap.argmin(axis=1)).argmax())
+    return features, source + [source[thinned_pattern]] * len(_THIN_DENSITIES), thinned_pattern
 
 
 def _median_density(patches: Patches, patch_of_root: Ints) -> float:

@@ -36,7 +36,7 @@ from .cached_picture import CachedPicture
 from .camera import Camera
 from .capabilities import NOISE_FREE_SAMPLES, capabilities
 from .collider_textures import UploadedColliders
-from .detail_pass import DetailPass
+from .detail_pass import DetailOrder, DetailPass
 from .display import Display
 from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
@@ -203,32 +203,17 @@ class StrandPass:
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
-        if view.is_sample:
-            display = None
-        output_encoding = output_index("scene_linear" if view.is_sample else output)
         self._upload(snapshot)
-        size = width // samples, height // samples
-        serial = self._points_serial
         is_debug = content == "light" and snapshot.debug_view != "none"
         transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         is_layered = transparency == "layers"
-        view_data.is_moving = (
-            view.is_moving and is_layered and view_data.detail.has_rest_counts(snapshot)
-        )
-        order = view_data.detail.order(
-            *(snapshot, self._textures, serial, camera, size),
-            by_depth=not is_layered,
-            counted=is_layered and view.name is not None,
-            reserve_fragments=LAYERS_OF_PIXELS.reserve if view_data.is_moving else None,
-        )
+        size = width // samples, height // samples
+        order = self._order(snapshot, camera, size, view, is_layered=is_layered)
         if not order.classes:
             return
         maps = None
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
-        if content == "light" and not other_maps:
-            # else it keeps maps of grooms that are gone
-            view_data.shadows.inter_groom_shadow.release()
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.strip,
@@ -239,32 +224,21 @@ class StrandPass:
                 self._curves(snapshot),
             ),
             shading=(
-                tuple(
-                    self._shading(snapshot, maps, view_data.shadows.inter_groom_shadow, other_maps)
-                )
+                self._light(snapshot, view_data, maps, other_maps)
                 if content == "light"
                 else (self._tangents(snapshot),)
             ),
             display_features=(
-                *(() if display is None else (display.feature,)),
+                *(() if display is None or view.is_sample else (display.feature,)),
                 *((self._debug_feature(snapshot),) if is_debug else ()),
             ),
-            output_encoding=output_encoding,
+            output_encoding=output_index("scene_linear" if view.is_sample else output),
             samples_across=samples,
             expected_depths=lambda: expected_depths(self._ball.ball(snapshot), camera),
         )
         layers = LayerStatistics()
         if is_layered:
-            layers = LAYERS_OF_PIXELS.draw(
-                drawing,
-                is_own_target=output == "scene_linear",
-                in_parts=view_data.part_count > 1,
-                is_moving=view_data.is_moving,
-                is_turning=view.is_turning,
-                picture=view.picture,
-                is_sample=view.is_sample,
-            )
-            view_data.part_count = view_data.part_count if view_data.is_moving else layers.parts
+            layers = self._draw_layers(drawing, view, is_own_target=output == "scene_linear")
         elif transparency == "hashed":
             HASHED_STRANDS.draw(drawing)
         else:
@@ -277,6 +251,56 @@ class StrandPass:
             layers=layers,
             maps_note="" if maps is None else maps.note,
         )
+
+    def _order(
+        self,
+        snapshot: Snapshot,
+        camera: Camera,
+        size: tuple[int, int],
+        view: ViewState,
+        *,
+        is_layered: bool,
+    ) -> DetailOrder:
+        """The strands to draw and their pieces; size: of the final picture [pixels]."""
+        view_data = self._views[view.name]
+        detail = view_data.detail
+        view_data.is_moving = view.is_moving and is_layered and detail.has_rest_counts(snapshot)
+        return detail.order(
+            *(snapshot, self._textures, self._points_serial, camera, size),
+            by_depth=not is_layered,
+            counted=is_layered and view.name is not None,
+            reserve_fragments=LAYERS_OF_PIXELS.reserve if view_data.is_moving else None,
+        )
+
+    def _light(
+        self,
+        snapshot: Snapshot,
+        view_data: _View,
+        maps: OpacityMaps | None,
+        other_maps: Sequence[OpacityMaps],
+    ) -> tuple[ShaderFeature, ...]:
+        """The features of programs that write light."""
+        inter_groom_shadow = view_data.shadows.inter_groom_shadow
+        if not other_maps:  # else it keeps maps of grooms that are gone
+            inter_groom_shadow.release()
+        return tuple(self._shading(snapshot, maps, inter_groom_shadow, other_maps))
+
+    def _draw_layers(
+        self, drawing: StrandDrawing, view: ViewState, *, is_own_target: bool
+    ) -> LayerStatistics:
+        view_data = self._views[view.name]
+        layers = LAYERS_OF_PIXELS.draw(
+            drawing,
+            is_own_target=is_own_target,
+            in_parts=view_data.part_count > 1,
+            is_moving=view_data.is_moving,
+            is_turning=view.is_turning,
+            picture=view.picture,
+            is_sample=view.is_sample,
+        )
+        if not view_data.is_moving:
+            view_data.part_count = layers.parts
+        return layers
 
     def opacity(
         self, snapshot: Snapshot, *, view: Hashable = None, is_turning: bool = False
