@@ -6,7 +6,7 @@ Reading changes nothing, and keeps no references to Blender's data.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -60,6 +60,35 @@ class _ReadGroom:
     groom: DrawnGroom
 
 
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """One reading of a scene, and what it has found so far.
+
+    layer: whose visibility counts. is_hair_scene: whether solids only hold the hair out. changed,
+    is_previewed, has_pending_preview, blocking: see `SceneReader.read`.
+    """
+
+    depsgraph: bpy.types.Depsgraph
+    layer: bpy.types.ViewLayer
+    is_hair_scene: bool
+    changed: set[int] | None
+    is_previewed: Callable[[int], bool]
+    has_pending_preview: Callable[[int], bool]
+    blocking: bool
+    drawn: list[MeshSnapshot] = field(default_factory=list)
+    casters: list[MeshSnapshot] = field(default_factory=list)
+    meshes: dict[Key, _ReadMesh] = field(default_factory=dict)
+    grooms: dict[Key, _ReadGroom] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+    def mesh_notes(self) -> tuple[str, ...]:
+        """Notes on materials, and on UVs where a soft shadow needs them, each once."""
+        notes = [note for each in self.meshes.values() for note in each.notes]
+        if any(_has_soft_shadow(each.groom.snapshot) for each in self.grooms.values()):
+            notes += [note for each in self.meshes.values() for note in each.skin_notes]
+        return tuple(dict.fromkeys(notes))
+
+
 class SceneReader:
     """Reads a scene repeatedly; unchanged meshes and grooms stay the same objects.
 
@@ -98,72 +127,83 @@ class SceneReader:
                 preview is about to be shown.
             blocking: False: hair is built in a thread, and stays as it was until then.
         """
-        warnings: list[str] = []
-        drawn: list[MeshSnapshot] = []
-        casters: list[MeshSnapshot] = []
-        grooms: dict[Key, _ReadGroom] = {}
-        meshes: dict[Key, _ReadMesh] = {}
+        drawn_scene = hair_scene.drawn_scene(depsgraph.scene)
+        reading = _Reading(
+            depsgraph,
+            depsgraph.view_layer if drawn_scene is None else hair_scene.drawn_layer(drawn_scene),
+            drawn_scene is not None,
+            changed,
+            is_previewed,
+            has_pending_preview,
+            blocking,
+        )
         self.previewed, self.pending = {}, set()
         self._heads = _heads(depsgraph)
-        drawn_scene = hair_scene.drawn_scene(depsgraph.scene)
-        layer = depsgraph.view_layer if drawn_scene is None else hair_scene.drawn_layer(drawn_scene)
         for instance in depsgraph.object_instances:
-            obj = instance.object
-            if not instance.show_self or not is_shown(_scene_object(instance)):
-                continue
-            key, matrix = _instance_key(instance), np.array(instance.matrix_world)
-            visibility = _visibility(instance, layer)
-            # a preview draws a groom once; its instances are read like any other hair
-            is_original = obj.type == "CURVES" and not instance.is_instance
-            if drawn_scene is not None and obj.type in SOLID_TYPES:
-                visibility = replace(visibility, is_holdout=True)
-            if obj.type in SOLID_TYPES:
-                meshes[key] = self._read_mesh(key, obj, matrix, visibility, changed)
-                if visibility.is_seen:
-                    drawn += meshes[key].meshes
-                if visibility.casts_shadow:
-                    casters += meshes[key].meshes
-            elif is_original and is_previewed(obj.original.session_uid):
-                self.previewed[obj.original.session_uid] = visibility
-            elif obj.type == "CURVES" and has_pending_preview(obj.original.session_uid):
-                grooms |= {key: self._grooms[key]} if key in self._grooms else {}
-            elif obj.type == "CURVES" and visibility.is_seen:
-                hair = obj.original
-                groom = self._read_groom(
-                    key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, blocking
-                )
-                grooms |= {} if groom is None else {key: groom}
-        self._meshes, self._grooms = meshes, grooms
+            if instance.show_self and is_shown(_scene_object(instance)):
+                self._read_instance(reading, instance)
+        self._meshes, self._grooms = reading.meshes, reading.grooms
         if not blocking:  # a render's thread must not read bpy.data.objects, as the window may edit
             engine_hair.forget_deleted()
-        drawn_grooms = tuple(each.groom for each in grooms.values())
-        center = _center(drawn_grooms, drawn)
-        mesh_notes = [note for each in meshes.values() for note in each.notes]
-        if any(_has_soft_shadow(each.groom.snapshot) for each in grooms.values()):
-            mesh_notes += [note for each in meshes.values() for note in each.skin_notes]
+        grooms = tuple(each.groom for each in reading.grooms.values())
         environment = read_environment(depsgraph.scene_eval, blocking=blocking)
-        light_notes = light_warnings(depsgraph, environment.suns)
-        of_world = world_notes(depsgraph.scene_eval)
-        self.warnings = (*warnings, *dict.fromkeys(mesh_notes), *light_notes, *of_world)
+        self.warnings = (
+            *reading.warnings,
+            *reading.mesh_notes(),
+            *light_warnings(depsgraph, environment.suns),
+            *world_notes(depsgraph.scene_eval),
+        )
         return SceneSnapshot(
-            meshes=tuple(drawn),
-            casters=tuple(casters),
-            grooms=drawn_grooms,
-            lights=read_lights(depsgraph, center, environment.suns),
+            meshes=tuple(reading.drawn),
+            casters=tuple(reading.casters),
+            grooms=grooms,
+            lights=read_lights(depsgraph, _center(grooms, reading.drawn), environment.suns),
             ambient=environment.ambient,
             harmonics=environment.harmonics,
             mesh_shadows=settings_of(depsgraph.scene.hairloom.mesh_shadows, MeshShadowSettings),
         )
 
+    def _read_instance(
+        self, reading: _Reading, instance: bpy.types.DepsgraphObjectInstance
+    ) -> None:
+        """Add an instance of an object to the reading."""
+        obj, key = instance.object, _instance_key(instance)
+        matrix = np.array(instance.matrix_world)
+        visibility = _visibility(instance, reading.layer)
+        if obj.type in SOLID_TYPES:
+            if reading.is_hair_scene:
+                visibility = replace(visibility, is_holdout=True)
+            mesh = self._read_mesh(reading, key, obj, matrix, visibility)
+            reading.meshes[key] = mesh
+            if visibility.is_seen:
+                reading.drawn.extend(mesh.meshes)
+            if visibility.casts_shadow:
+                reading.casters.extend(mesh.meshes)
+            return
+        if obj.type != "CURVES":
+            return
+        hair = obj.original
+        # a preview draws a groom once; its instances are read like any other hair
+        if not instance.is_instance and reading.is_previewed(hair.session_uid):
+            self.previewed[hair.session_uid] = visibility
+            return
+        groom = None
+        if reading.has_pending_preview(hair.session_uid):
+            groom = self._grooms.get(key)
+        elif visibility.is_seen:
+            groom = self._read_groom(reading, key, hair, matrix, is_holdout=visibility.is_holdout)
+        if groom is not None:
+            reading.grooms[key] = groom
+
     def _read_mesh(
         self,
+        reading: _Reading,
         key: Key,
         obj: bpy.types.Object,
         matrix: Floats,
         visibility: Visibility,
-        changed: set[int] | None,
     ) -> _ReadMesh:
-        previous = self._meshes.get(key)
+        previous, changed = self._meshes.get(key), reading.changed
         if (
             previous is not None
             and changed is not None
@@ -193,46 +233,44 @@ class SceneReader:
 
     def _read_groom(
         self,
+        reading: _Reading,
         key: Key,
         hair: bpy.types.Object,
         matrix: Floats,
-        depsgraph: bpy.types.Depsgraph,
-        changed: set[int] | None,
-        warnings: list[str],
+        *,
         is_holdout: bool,
-        blocking: bool,
     ) -> _ReadGroom | None:
         """A groom; None with a warning if it cannot be drawn, or None until it is built."""
         if hair.type != "CURVES":
-            warnings.append(
+            reading.warnings.append(
                 f"{hair.name}: hair that modifiers create on other types of objects is not drawn. "
                 "Use hair curves."
             )
             return None
-        previous, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid
+        depsgraph, changed, blocking = reading.depsgraph, reading.changed, reading.blocking
+        previous, owner = self._grooms.get(key), engine_hair.owner_of(hair)
+        uid = owner.session_uid
         try:
             state: tuple[Any, ...]
             state = (*engine_hair.state_key(hair, depsgraph), matrix.tobytes(), is_holdout)
-            is_same = previous is not None and changed is not None and previous.state == state
             if (
                 previous is not None
-                and is_same
-                and not (changed or set()) & engine_hair.uids_of(hair)
+                and changed is not None
+                and previous.state == state
+                and not changed & engine_hair.uids_of(hair)
             ):
                 return previous
             snapshot = engine_hair.read_groom(hair, depsgraph, blocking=blocking)
         except HairNotReadyError:
             self.pending.add(uid)
-            return (
-                None if previous is None else _ReadGroom((), previous.groom)
-            )  # no state, so read again
+            # without a state, so that it is read again
+            return None if previous is None else _ReadGroom((), previous.groom)
         except HairloomError as error:
-            warnings.append(str(error))
+            reading.warnings.append(str(error))
             return None
         if len(key) > 1:
             own_matrix = np.array(hair.evaluated_get(depsgraph).matrix_world)
             snapshot = engine_hair.transformed(snapshot, matrix @ np.linalg.pinv(own_matrix))
-        owner = engine_hair.owner_of(hair)
         if not blocking and engine_hair.is_pending(uid):
             self.pending.add(uid)
             state = ()
