@@ -29,7 +29,7 @@ from ...exchange.cards.card_page import PAGE_SUFFIX
 from ...exchange.cards.glb_file import GlbFile
 from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
 from ...exchange.cards.glb_springs import HeadBone
-from ...exchange.cards.index_buffer import index_buffer
+from ...exchange.cards.index_buffer import IndexBuffer, index_buffer
 from ...exchange.cards.sidecar import (
     SUFFIX,
     CardFile,
@@ -268,6 +268,20 @@ def file_steps(
     return WrittenCards(made.build, made.maps, paths, notes, writer.motion, writer.figures)
 
 
+@dataclass(frozen=True, eq=False)
+class _Textures:
+    """Textures that were written.
+
+    look: the material in the mesh's file. roles, channels: see `texture_roles` and
+    `texture_channels`. tables: name -> file.
+    """
+
+    look: CardLook
+    roles: Mapping[str, Any]
+    channels: Mapping[str, Any]
+    tables: Mapping[str, str]
+
+
 @dataclass(eq=False)
 class _Writer:
     """Writes all files into the folder of `path`. motion, figures: see `WrittenCards`."""
@@ -346,69 +360,103 @@ class _Writer:
         skeleton: JointMotion | SpringMotion | None = None,
     ) -> tuple[str, ...]:
         """Write textures, mesh and indices, and the sidecar last; returns notes for the artist."""
-        path, build, maps = self.path, self.made.build, self.made.maps
-        settings, nodes = self.output.settings, level_names(self._name, len(levels))
-        shading = self.settings[ShadingSettings]
-        if maps.base_color is not None:
-            shading = in_color(maps.base_color, shading)
-        card = maps.plain_card(self.settings[ShadingSettings])
+        build, maps, settings = self.made.build, self.made.maps, self.output.settings
+        nodes = level_names(self._name, len(levels))
         with self.stage("write textures"):
-            grid = build.finest.atlas
-            named = {**maps.by_name, "color": card[..., :3]}
-            written = write_textures(path.parent, path.stem, named, grid, settings)
-            tables = write_tables(path.parent, path.stem, shading)
-        roles = texture_roles(written, named)
-        look = _look(card, written)
+            textures = self._write_textures()
         with self.stage("write cards"):
-            write_card_mesh(
-                path,
-                levels,
-                self.file_format,
-                look,
-                name=self._name,
-                portable=not settings.attributes,
-                texels=texels,
-            )
+            self._write_mesh(levels, textures.look, texels)
             if skeleton is not None:
-                skeleton.complete(path, nodes)
+                skeleton.complete(self.path, nodes)
             notes = self._complete(levels, nodes)
-        indices = None
-        if settings.index_buffer:
-            indices = f"{path.stem}.indices.bin", index_buffer(levels, backs)
-            path.with_name(indices[0]).write_bytes(indices[1].content)
+        indices = self._write_indices(levels, backs) if settings.index_buffer else None
         sidecar = CardFile(
-            path.name,
+            self.path.name,
             self.file_format,
             tuple(levels),
             nodes,
             errors=build.errors,
             portable=not settings.attributes,
-            textures=roles,
-            texture_files=texture_channels(written),
+            textures=textures.roles,
+            texture_files=textures.channels,
             base_gain=maps.base_gain,
             highlights=maps.highlights,
             view_compensated_alpha=VIEW_COMPENSATED_ALPHA if maps.is_view_compensated else {},
-            material=material_of(shading, tables),
+            material=material_of(self._shading, textures.tables),
             indices=indices,
             motion=self.motion,
-            page=path.stem + PAGE_SUFFIX if settings.page else "",
+            page=self.path.stem + PAGE_SUFFIX if settings.page else "",
             generator=hairloom_version(),
         )
         content = sidecar_text(sidecar)
         self._complete_with_digest(content)
         if settings.page:
             with self.stage("write page"):
-                head = None
-                if self.head is not None and settings.page_head:
-                    head = PageHead.of(path, self.head, self.output.head_look, self.file_format)
-                carrier = skeleton.carrier if isinstance(skeleton, JointMotion) else np.eye(4)[None]
-                write_page(
-                    path, self._name, sidecar, self.made, shading, backs, head, settings, carrier
-                )
-            if self.motion.get("kind") in ("texture", "springs"):
-                notes += (PAGE_AT_REST,)
-        path.with_name(path.stem + SUFFIX).write_text(content, encoding="utf-8")
+                notes += self._write_page(sidecar, backs, skeleton)
+        self.path.with_name(self.path.stem + SUFFIX).write_text(content, encoding="utf-8")
         return notes
+
+    @property
+    def _shading(self) -> ShadingSettings:
+        """The look of the hair, in the base colour of the maps if they have one."""
+        shading, base_color = self.settings[ShadingSettings], self.made.maps.base_color
+        return shading if base_color is None else in_color(base_color, shading)
+
+    def _write_textures(self) -> _Textures:
+        maps, folder, stem = self.made.maps, self.path.parent, self.path.stem
+        card = maps.plain_card(self.settings[ShadingSettings])
+        all_maps = {**maps.by_name, "color": card[..., :3]}
+        grid = self.made.build.finest.atlas
+        written = write_textures(folder, stem, all_maps, grid, self.output.settings)
+        tables = write_tables(folder, stem, self._shading)
+        roles, channels = texture_roles(written, all_maps), texture_channels(written)
+        return _Textures(_look(card, written), roles, channels, tables)
+
+    def _write_mesh(
+        self, levels: Sequence[CardMesh], look: CardLook, texels: Sequence[Floats]
+    ) -> None:
+        write_card_mesh(
+            self.path,
+            levels,
+            self.file_format,
+            look,
+            name=self._name,
+            portable=not self.output.settings.attributes,
+            texels=texels,
+        )
+
+    def _write_indices(
+        self, levels: Sequence[CardMesh], backs: Sequence[Ints]
+    ) -> tuple[str, IndexBuffer]:
+        """Returns the file's name, and what is in it."""
+        name, indices = f"{self.path.stem}.indices.bin", index_buffer(levels, backs)
+        self.path.with_name(name).write_bytes(indices.content)
+        return name, indices
+
+    def _write_page(
+        self,
+        sidecar: CardFile,
+        backs: Sequence[Ints],
+        skeleton: JointMotion | SpringMotion | None,
+    ) -> tuple[str, ...]:
+        """Returns notes for the artist."""
+        path, output = self.path, self.output
+        head = None
+        if self.head is not None and output.settings.page_head:
+            head = PageHead.of(path, self.head, output.head_look, self.file_format)
+        carrier = skeleton.carrier if isinstance(skeleton, JointMotion) else np.eye(4)[None]
+        write_page(
+            path,
+            self._name,
+            sidecar,
+            self.made,
+            self._shading,
+            backs,
+            head,
+            output.settings,
+            carrier,
+        )
+        return (PAGE_AT_REST,) if self.motion.get("kind") in ("texture", "springs") else ()
 
     def _complete_with_digest(self, sidecar: str) -> None:
         """Store a digest of all files beside it in a GLB, so that engines that import a file again
