@@ -308,7 +308,7 @@ def draw(folder: Path) -> None:
     from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
     from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
     from hairloom.addon.refine.settings import DetailSettings
-    from hairloom.addon.render.frame import frame_camera
+    from hairloom.addon.render.camera import frame_camera
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
     hair = ponytail(8000)

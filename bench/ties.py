@@ -118,7 +118,7 @@ def draw(tail: Ponytail, shown: list, path: Path) -> None:
     from hairloom.addon.blender.properties.groom_settings import GroomSettings
     from hairloom.addon.blender.sessions.prepared_groom import prepare_groom
     from hairloom.addon.refine.settings import DetailSettings
-    from hairloom.addon.render.frame import frame_camera
+    from hairloom.addon.render.camera import frame_camera
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
     settings = GroomSettings().with_settings(DetailSettings(lod_size=0.0))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.render.camera import Camera, look_at, orthographic
 from hairloom.addon.shading.textures import HairTextures
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
@@ -80,8 +81,6 @@ def snapshot_of(mesh: CardMesh, textures: HairTextures, *, cards: Any = None, **
     )
 
 
-def camera(frame: Any, y: float = -1.0) -> Any:
+def camera(y: float = -1.0) -> Any:
     """Shows x and z from 0 to 1; looks along +y, or along -y from a greater y."""
-    return frame.Camera(
-        frame.look_at((0.5, y, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, -3.0, 5.0)
-    )
+    return Camera(look_at((0.5, y, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, -3.0, 5.0))

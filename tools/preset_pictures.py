@@ -84,14 +84,14 @@ def write_thumbnail(path: Path, picture: Any) -> None:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
-    frame, images = addon_module("render.frame"), addon_module("blender.base.images")
+    cameras, images = addon_module("render.camera"), addon_module("blender.base.images")
     view = addon_module("blender.pictures.studio").FIELD_OF_VIEW
     presets, rig = addon_module("blender.properties.presets"), wig()
     studio, points = studio_of(rig), rig.strands.points
     box = points.min(axis=0), points.max(axis=0)
 
     def picture(width: int, height: int, lights: Any = None) -> Any:
-        camera = frame.frame_camera(box, DIRECTION, view, width / height, margin=MARGIN)
+        camera = cameras.frame_camera(box, DIRECTION, view, width / height, margin=MARGIN)
         return studio.picture(
             *(rig.rest_pose, points, width, height, SAMPLES),
             camera=camera,

@@ -42,6 +42,7 @@ def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
     frame, images = addon_module("render.frame"), addon_module("blender.base.images")
+    cameras, snapshots = addon_module("render.camera"), addon_module("render.snapshot")
     shading, lights = (
         addon_module("parameters").ALL_SETTINGS["shading"],
         addon_module("shading.lights"),
@@ -54,16 +55,16 @@ def main(folder: Path) -> None:
     volume = addon_module("parameters").ALL_SETTINGS["volume"]
     strands = combed_strands(STRANDS)
     skin = addon_module("strands").Surface(*ball_mesh())
-    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
-    camera = frame.Camera(
-        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
-        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    ball = replace(snapshots.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
+    camera = cameras.Camera(
+        cameras.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        cameras.orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
 
     def picture(
         look: Any, shines_along: tuple[float, ...], strength: float, shadows: str = "none"
     ) -> Any:
-        snapshot = frame.Snapshot(
+        snapshot = snapshots.Snapshot(
             strands,
             np.full(strands.shape[:2], RADIUS, np.float32),
             meshes=(ball,),

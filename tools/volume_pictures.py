@@ -102,11 +102,12 @@ def shadow_pictures(strands: Any) -> list[Any]:
     """The ball without shadows, with few and many slices, and with deep layers."""
     settings = addon_module("parameters").ALL_SETTINGS
     frame, lights = addon_module("render.frame"), addon_module("shading.lights")
+    cameras, snapshots = addon_module("render.camera"), addon_module("render.snapshot")
     skin = addon_module("strands").Surface(*ball_mesh())
-    ball = replace(frame.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
-    camera = frame.Camera(
-        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
-        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    ball = replace(snapshots.MeshSnapshot.of(skin, color=(0.0, 0.0, 0.0)), specular=0.0)
+    camera = cameras.Camera(
+        cameras.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        cameras.orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
     volume = settings["volume"](shadows="slices", strand_fraction=1.0)
     methods = (
@@ -119,7 +120,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
     sun = lights.Light.sun(SUN, (1.0, 1.0, 1.0), 4.0)
     return [
         frame.render_image(
-            frame.Snapshot(
+            snapshots.Snapshot(
                 strands,
                 radius,
                 meshes=(ball,),

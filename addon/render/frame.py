@@ -17,29 +17,16 @@ from ..shading.lights import packed_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.settings import StrandSettings
 from . import gpu_objects
-from .camera import Camera, frame_camera, look_at, orthographic, perspective
+from .camera import Camera
 from .camera_window import jittered, sample_place
 from .card_pass import CardPass
 from .light_samples import lights_at
 from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
 from .shafts_pass import finish_with_shafts
-from .snapshot import MeshSnapshot, Snapshot
+from .snapshot import Snapshot
 from .strand_pass import StrandPass, noise_free_samples
 from .textures import drawing_into, texture_to_array
-
-__all__ = [
-    "Camera",
-    "MeshSnapshot",
-    "Snapshot",
-    "frame_camera",
-    "look_at",
-    "orthographic",
-    "perspective",
-    "render_image",
-    "render_still",
-    "still_samples",
-]
 
 #: the largest side that a target may have on every GPU that Blender supports
 LARGEST_SIDE = 16384

@@ -15,7 +15,8 @@ from hairloom.addon.blender.scene.mesh_materials import (
     material_of,
     may_be_transparent,
 )
-from hairloom.addon.render.snapshot import MeshPictures
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshPictures, MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.strands import Surface
 
@@ -215,7 +216,7 @@ def test_a_plane_with_pictures_is_as_in_cycles(
     assert not read.notes
     none = np.zeros((0, 2, 3), np.float32)
     surface = square()
-    mesh = frame.MeshSnapshot(
+    mesh = MeshSnapshot(
         surface,
         np.tile(np.float32([0, 0, 1]), (4, 1)),
         color=read.color,
@@ -223,15 +224,15 @@ def test_a_plane_with_pictures_is_as_in_cycles(
         roughness=read.roughness,
         pictures=read.pictures,
     )
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         none,
         none[..., 0],
         meshes=(mesh,),
         lights=(Light.sun(-sun, (1.0, 1.0, 1.0), np.pi),),
         ambient=(0.0, 0.0, 0.0),
     )
-    view = frame.look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-    camera = frame.Camera(view, frame.orthographic(1.0, 1.0, 0.0, 3.0))
+    view = look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    camera = Camera(view, orthographic(1.0, 1.0, 0.0, 3.0))
     ours = frame.render_image(snapshot, camera, SIZE, SIZE, 4)[4:-4, 4:-4, :3]
     truth = of_cycles(material, sun, tmp_path)[4:-4, 4:-4, :3]
     assert truth.std(axis=(0, 1)).max() > 0.1
@@ -250,7 +251,7 @@ def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
     up, none = np.tile(np.float32([0, 0, 1]), (4, 1)), np.zeros((0, 2, 3), np.float32)
     red = MeshPictures(color=np.full((2, 2, 4), (1.0, 0.0, 0.0, 0.5), np.float32))
     for pictures, alpha in ((None, 0.5), (red, 1.0)):
-        sheet = frame.MeshSnapshot(
+        sheet = MeshSnapshot(
             surface,
             up,
             color=(1.0, 0.0, 0.0),
@@ -259,12 +260,10 @@ def test_meshes_cover_as_much_as_their_alpha_says(transparency: str) -> None:
             alpha=alpha,
             transparency=transparency,
         )
-        floor = frame.MeshSnapshot(behind, up, color=(0.0, 0.0, 1.0), specular=0.0)
-        snapshot = frame.Snapshot(
-            none, none[..., 0], meshes=(sheet, floor), ambient=(1.0, 1.0, 1.0)
-        )
-        view = frame.look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-        camera = frame.Camera(view, frame.orthographic(1.0, 1.0, 0.0, 3.0))
+        floor = MeshSnapshot(behind, up, color=(0.0, 0.0, 1.0), specular=0.0)
+        snapshot = Snapshot(none, none[..., 0], meshes=(sheet, floor), ambient=(1.0, 1.0, 1.0))
+        view = look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+        camera = Camera(view, orthographic(1.0, 1.0, 0.0, 3.0))
         seen = frame.render_image(snapshot, camera, 32, 32, 4)
         expected = (1.0, 0.0, 0.0) if transparency == "opaque" else (0.5, 0.0, 0.5)
         assert seen[2:-2, 2:-2, :3].mean(axis=(0, 1)) == pytest.approx(expected, abs=0.02)
@@ -279,7 +278,7 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
     surface, none = square(), np.zeros((0, 2, 3), np.float32)
     up = np.tile(np.float32([0, 0, 1]), (4, 1))
     sheets = [
-        frame.MeshSnapshot(
+        MeshSnapshot(
             Surface(surface.positions + np.float32([0, 0, z]), surface.triangles),
             up,
             color=color,
@@ -289,10 +288,10 @@ def test_blended_meshes_are_drawn_from_far_to_near() -> None:
         )
         for z, color in ((0.3, (1.0, 0.0, 0.0)), (0.0, (0.0, 0.0, 1.0)))
     ]
-    view = frame.look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-    camera = frame.Camera(view, frame.orthographic(1.0, 1.0, 0.0, 3.0))
+    view = look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    camera = Camera(view, orthographic(1.0, 1.0, 0.0, 3.0))
     for order in (sheets, sheets[::-1]):
-        snapshot = frame.Snapshot(none, none[..., 0], meshes=tuple(order), ambient=(1.0, 1.0, 1.0))
+        snapshot = Snapshot(none, none[..., 0], meshes=tuple(order), ambient=(1.0, 1.0, 1.0))
         seen = frame.render_image(snapshot, camera, 16, 16, 1)
         assert seen[8, 8] == pytest.approx((0.5, 0.0, 0.25, 0.75), abs=1e-3)
 

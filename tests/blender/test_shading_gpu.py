@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from gpu_rounding import tolerance
 
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.kajiya_kay import strand_normal
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.look import fibre_of, marschner_light, strand_absorption
@@ -30,12 +32,12 @@ def frame() -> Any:
     return frame
 
 
-def snapshot_of(frame: Any, shading: ShadingSettings, **more: Any) -> Any:
+def snapshot_of(shading: ShadingSettings, **more: Any) -> Any:
     """A fan of wide straight strands in the plane y = 0, lit by one sun."""
     angle = np.radians(np.linspace(-40.0, 40.0, 9))
     tips = 0.4 * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
     strands = np.stack([0.25 * tips, tips], axis=1).astype(np.float32)
-    return frame.Snapshot(
+    return Snapshot(
         strands,
         np.full((9, 2), 0.012, np.float32),
         lights=(Light.sun((0.1, 1.0, -0.4), (1.0, 0.9, 0.8), 3.0),),
@@ -51,9 +53,7 @@ def snapshot_of(frame: Any, shading: ShadingSettings, **more: Any) -> Any:
 
 def drawn(frame: Any, snapshot: Any, passes: Any = None) -> np.ndarray:
     """The picture seen from -y, with x from -0.25 to 0.25 and z from 0 to 0.5."""
-    camera = frame.Camera(
-        frame.look_at((0.0, -1.0, 0.25), (0.0, 0.0, 0.25)), frame.orthographic(0.5, 1.0, 0.0, 3.0)
-    )
+    camera = Camera(look_at((0.0, -1.0, 0.25), (0.0, 0.0, 0.25)), orthographic(0.5, 1.0, 0.0, 3.0))
     picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1, passes=passes)
     return picture
 
@@ -62,7 +62,7 @@ def drawn(frame: Any, snapshot: Any, passes: Any = None) -> np.ndarray:
 def test_strands_have_the_light_of_the_reference(frame: Any, melanin: float) -> None:
     """A straight strand reads between texels, on every backend."""
     shading = replace(PLAIN, pigment="melanin", melanin=melanin)
-    snapshot = snapshot_of(frame, shading)
+    snapshot = snapshot_of(shading)
     picture = drawn(frame, snapshot)
     root, tip = snapshot.points[::2].astype(np.float64), snapshot.points[1::2].astype(np.float64)
     point = 0.5 * (root + tip)
@@ -99,19 +99,19 @@ def test_tables_are_computed_once_per_fibre_shape_and_shared(
 
     monkeypatch.setattr(marschner_textures, "marschner_tables", counted)
     marschner_textures.MARSCHNER.release()
-    first = drawn(frame, snapshot_of(frame, PLAIN))
+    first = drawn(frame, snapshot_of(PLAIN))
     changes: tuple[dict[str, Any], ...] = (
         {"base_color": (0.5, 0.1, 0.1)},
         {"strength_r": 0.2, "strength_trt": 3.0},
         {"tip_tint": 1.0, "grey_fraction": 0.5, "fake_scattering": 0.0},
     )
     for change in changes:
-        assert (drawn(frame, snapshot_of(frame, replace(PLAIN, **change))) != first).any()
+        assert (drawn(frame, snapshot_of(replace(PLAIN, **change))) != first).any()
     assert len(made) == 1
     for step in range(marschner_textures.CAPACITY):
-        drawn(frame, snapshot_of(frame, replace(PLAIN, width_r=0.05 + 0.01 * step)))
+        drawn(frame, snapshot_of(replace(PLAIN, width_r=0.05 + 0.01 * step)))
     assert len(made) == 1 + marschner_textures.CAPACITY
-    assert (drawn(frame, snapshot_of(frame, PLAIN)) == first).all()
+    assert (drawn(frame, snapshot_of(PLAIN)) == first).all()
     assert len(made) == 2 + marschner_textures.CAPACITY
 
 
@@ -122,9 +122,9 @@ def test_models_take_turns_in_one_pass(frame: Any) -> None:
     from hairloom.addon.render.strand_pass import StrandPass
 
     passes = MeshPass(), StrandPass()
-    marschner = snapshot_of(frame, PLAIN)
-    kajiya_kay = snapshot_of(frame, replace(PLAIN, model="kajiya_kay"))
-    debug = snapshot_of(frame, PLAIN, debug_view="detail")
+    marschner = snapshot_of(PLAIN)
+    kajiya_kay = snapshot_of(replace(PLAIN, model="kajiya_kay"))
+    debug = snapshot_of(PLAIN, debug_view="detail")
     pictures = [drawn(frame, shown, passes) for shown in (marschner, kajiya_kay, debug)]
     for one, other in ((0, 1), (0, 2), (1, 2)):
         assert (pictures[one] != pictures[other]).any()

@@ -11,6 +11,8 @@ import pytest
 from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -46,13 +48,13 @@ def curtain(count: int, spacing: float, height: float) -> np.ndarray:
 
 def seen(frame: Any, snapshot: Any, height: float = 0.2) -> np.ndarray:
     """Seen from below; the picture covers `height` [m]."""
-    view = frame.look_at((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-    camera = frame.Camera(view, frame.orthographic(height, 1.0, 0.0, 3.0))
+    view = look_at((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    camera = Camera(view, orthographic(height, 1.0, 0.0, 3.0))
     picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
     return picture
 
 
-def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
+def snapshot_of(strands: np.ndarray, **more: Any) -> Any:
     settings: dict[str, Any] = {
         "radius": np.full(strands.shape[:2], 1.0e-3, np.float32),
         "lights": (SUN,),
@@ -64,7 +66,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
         "volume_center": np.array([0.0, 0.0, -9.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }
-    return frame.Snapshot(strands, **{**settings, **more})
+    return Snapshot(strands, **{**settings, **more})
 
 
 def of_form(form: str, **more: Any) -> VolumeSettings:
@@ -85,8 +87,8 @@ def test_hair_behind_hair_gets_the_transmitted_light(
     radius[0] = 1.0e-4  # thin, so that it hardly shades itself
     # coarse texels, which average over many strands
     volume = of_form(form, extinction=extinction, resolution=16)
-    lit = seen(frame, snapshot_of(frame, below, radius=radius[:1], volume=volume), 1e-3)
-    shaded = seen(frame, snapshot_of(frame, strands, radius=radius, volume=volume), 1e-3)
+    lit = seen(frame, snapshot_of(below, radius=radius[:1], volume=volume), 1e-3)
+    shaded = seen(frame, snapshot_of(strands, radius=radius, volume=volume), 1e-3)
     middle = (slice(24, 40), slice(31, 33))
     is_hair = lit[middle][..., 3] == 1.0
     assert is_hair.any()
@@ -102,8 +104,8 @@ def test_a_mesh_between_hair_and_light_leaves_it_dark(frame: Any, form: str) -> 
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
     )
     strands = curtain(60, 2.0e-3, 0.0)
-    for more in ({"casters": (roof,)}, {"meshes": (frame.MeshSnapshot.of(roof),)}):
-        picture = seen(frame, snapshot_of(frame, strands, volume=of_form(form), **more))
+    for more in ({"casters": (roof,)}, {"meshes": (MeshSnapshot.of(roof),)}):
+        picture = seen(frame, snapshot_of(strands, volume=of_form(form), **more))
         hair = picture[20:44, 14:50, 0]
         # seen from below, x points to the left
         assert hair[:, :16].max() < 1e-6 or hair[:, 20:].max() < 1e-6
@@ -118,12 +120,12 @@ def test_hair_shades_the_skin_below(frame: Any, form: str) -> None:
         np.array([[0, 1, 2], [0, 2, 3]], np.int32),
     )
     strands = curtain(24, 4.0e-3, 0.05)
-    mesh = frame.MeshSnapshot.of(floor)
-    view = frame.look_at((0.0, -2.0, 0.6), (0.0, 0.0, 0.0))
-    camera = frame.Camera(view, frame.orthographic(0.2, 1.0, 0.0, 9.0))
+    mesh = MeshSnapshot.of(floor)
+    view = look_at((0.0, -2.0, 0.6), (0.0, 0.0, 0.0))
+    camera = Camera(view, orthographic(0.2, 1.0, 0.0, 9.0))
 
     def floor_seen(volume: VolumeSettings) -> np.ndarray:
-        snapshot = snapshot_of(frame, strands, meshes=(mesh,), volume=volume)
+        snapshot = snapshot_of(strands, meshes=(mesh,), volume=volume)
         picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
         return picture[:, :, 0]
 
@@ -161,9 +163,7 @@ def test_no_end_of_a_range_draws_anything_but_numbers(
     form = "slices" if name == "slices" else "deep"
     volume = replace(VolumeSettings(shadows=form, resolution=64), **{name: value})
     shading = replace(PLAIN, model=model, base_color=(0.5, 0.4, 0.3))
-    picture = seen(
-        frame, snapshot_of(frame, strands, lights=lights, volume=volume, shading=shading)
-    )
+    picture = seen(frame, snapshot_of(strands, lights=lights, volume=volume, shading=shading))
     assert np.isfinite(picture).all()
     assert picture[..., 0].max() > 0.0
 
@@ -177,7 +177,7 @@ def test_light_from_strand_to_strand_brightens_light_hair_and_not_black(frame: A
             PLAIN, model="marschner", pigment="melanin", melanin=melanin, fake_scattering=0.0
         )
         pictures = [
-            seen(frame, snapshot_of(frame, strands, shading=shading, volume=volume))
+            seen(frame, snapshot_of(strands, shading=shading, volume=volume))
             for volume in (of_form("deep"), replace(of_form("deep"), scattering=True))
         ]
         alone, among = (picture[20:44, 20:44, 0].mean() for picture in pictures)
@@ -190,7 +190,7 @@ def test_a_curtain_of_strands_in_any_order_throws_the_same_shadow(frame: Any) ->
     seeds = np.arange(len(strands))
     order = np.random.default_rng(3).permutation(len(strands))
     pictures = [
-        seen(frame, snapshot_of(frame, strands[rows], seed=seeds[rows], volume=of_form("deep")))
+        seen(frame, snapshot_of(strands[rows], seed=seeds[rows], volume=of_form("deep")))
         for rows in (seeds, order)
     ]
     assert np.abs(pictures[0] - pictures[1]).max() < 1.0 / 255.0

@@ -13,6 +13,8 @@ from extension_loader import REPOSITORY
 from hair_ball import ball_mesh, combed_strands
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.principled import PrincipledHair, settings_from
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -56,8 +58,8 @@ def drawn(
 
     node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=BLOND)
     alike = ShadingSettings(color_variation=0.0, shift_noise=0.0, sparkle=0.0)
-    mesh = frame.MeshSnapshot.of(ball, color=skin)
-    snapshot = frame.Snapshot(
+    mesh = MeshSnapshot.of(ball, color=skin)
+    snapshot = Snapshot(
         strands,
         np.full(strands.shape[:2], RADIUS, np.float32),
         meshes=(replace(mesh, specular=0.0, is_holdout=True),),
@@ -69,8 +71,8 @@ def drawn(
         volume=VolumeSettings(shadows="deep", strand_fraction=1.0, resolution=resolution),
         volume_center=np.zeros(3, np.float32),
     )
-    view = frame.look_at((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
-    camera = frame.Camera(view, frame.orthographic(HEIGHT, 1.0, 1.0, 2.0 * DISTANCE))
+    view = look_at((0.0, 0.0, DISTANCE), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    camera = Camera(view, orthographic(HEIGHT, 1.0, 1.0, 2.0 * DISTANCE))
     picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, SAMPLES)
     return picture
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+
 SHADERS = Path(__file__).parent / "shaders"
 
 
@@ -28,14 +30,14 @@ def frame(gpu_context: Any) -> Any:
 
 
 @pytest.fixture(scope="session")
-def square_camera(frame: Any) -> Callable[..., Any]:
+def square_camera() -> Callable[..., Any]:
     """A function that makes an orthographic camera along +y for x and z from 0 to `size` [m]."""
 
     def make(size: float) -> Any:
         middle = size / 2
-        return frame.Camera(
-            frame.look_at((middle, -100.0, middle), (middle, 0.0, middle)),
-            frame.orthographic(size, 1.0, 0.0, 200.0),
+        return Camera(
+            look_at((middle, -100.0, middle), (middle, 0.0, middle)),
+            orthographic(size, 1.0, 0.0, 200.0),
         )
 
     return make

@@ -34,14 +34,9 @@ VOLUMES = {
 
 def picture(volume: VolumeSettings) -> np.ndarray:
     """A ball of blond hair under a sun and a lamp, in display values, (SIZE, SIZE, 3)."""
-    from hairloom.addon.render.frame import (
-        Camera,
-        MeshSnapshot,
-        Snapshot,
-        look_at,
-        perspective,
-        render_image,
-    )
+    from hairloom.addon.render.camera import Camera, look_at, perspective
+    from hairloom.addon.render.frame import render_image
+    from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 
     strands = combed_strands(1000)
     snapshot = Snapshot(

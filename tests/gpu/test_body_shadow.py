@@ -48,7 +48,8 @@ def shadow(
     import gpu
 
     from hairloom.addon.render.body_shadow import BodyShadow
-    from hairloom.addon.render.frame import Camera, Snapshot, look_at, orthographic
+    from hairloom.addon.render.camera import Camera, look_at, orthographic
+    from hairloom.addon.render.snapshot import Snapshot
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import drawing_into, texture_to_array
 
@@ -128,8 +129,9 @@ def test_a_mesh_that_is_there_already_is_covered_without_gaps() -> None:
     import gpu
 
     from hairloom.addon.render.body_shadow import BodyShadow
-    from hairloom.addon.render.frame import Camera, MeshSnapshot, Snapshot, look_at, perspective
+    from hairloom.addon.render.camera import Camera, look_at, perspective
     from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import drawing_into, texture_to_array
 

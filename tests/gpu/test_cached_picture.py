@@ -10,6 +10,8 @@ import pytest
 from gpu_calls import gpu_calls
 from gpu_rounding import is_same
 
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -19,16 +21,14 @@ BACKGROUND = (0.2, 0.1, 0.0, 0.3)
 
 
 @pytest.fixture(scope="module")
-def scene(frame: Any) -> Any:
+def scene() -> Any:
     """Two grooms of random strands before and behind a mesh."""
     random = np.random.default_rng(3)
     ends = random.uniform(-0.5, 0.5, (2, 400, 2, 3)).astype(np.float32)
     square = np.array([[-0.3, 0, -0.3], [0.3, 0, -0.3], [0.3, 0.1, 0.4]], np.float32)
-    mesh = frame.MeshSnapshot.of(Surface(square, np.array([[0, 1, 2]])))
-    grooms = [frame.Snapshot(each, np.full((400, 2), 4e-3), meshes=(mesh,)) for each in ends]
-    camera = frame.Camera(
-        frame.look_at((0.3, -2.0, 0.2), (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0)
-    )
+    mesh = MeshSnapshot.of(Surface(square, np.array([[0, 1, 2]])))
+    grooms = [Snapshot(each, np.full((400, 2), 4e-3), meshes=(mesh,)) for each in ends]
+    camera = Camera(look_at((0.3, -2.0, 0.2), (0, 0, 0)), perspective(0.6, 1.0, 0.1, 5.0))
     return grooms, camera
 
 
@@ -147,10 +147,10 @@ def studio(camera: Any) -> Any:
     return three_point_lights(camera.view)
 
 
-def turned(frame: Any, degrees: float) -> Any:
+def turned(degrees: float) -> Any:
     angle = np.radians(degrees)
     eye = 2.0 * np.sin(angle), -2.0 * np.cos(angle), 0.2
-    return frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0))
+    return Camera(look_at(eye, (0, 0, 0)), perspective(0.6, 1.0, 0.1, 5.0))
 
 
 def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, scene: Any) -> None:
@@ -158,7 +158,7 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
     own, alone = frame.StrandPass(), frame.StrandPass()
 
     def dispatches(degrees: float, *, is_turning: bool) -> tuple[int, float]:
-        groom, maps = replace(grooms[0], lights=studio(turned(frame, degrees))), []
+        groom, maps = replace(grooms[0], lights=studio(turned(degrees))), []
         calls = gpu_calls(lambda: maps.append(own.opacity(groom, view=1, is_turning=is_turning)))
         lag = np.abs(maps[0].values - alone.opacity(groom).values).max()
         return calls["dispatches"] // 3, float(lag)
@@ -179,7 +179,7 @@ def test_views_side_by_side_keep_their_own_data(frame: Any, scene: Any) -> None:
     from hairloom.addon.render.strand_pass import ViewState
 
     grooms, _ = scene
-    cameras = {name: turned(frame, degrees) for name, degrees in (("a", 0.0), ("b", 120.0))}
+    cameras = {name: turned(degrees) for name, degrees in (("a", 0.0), ("b", 120.0))}
     own = frame.StrandPass()
 
     def picture(by: Any, name: str) -> tuple[np.ndarray, Any]:
@@ -211,7 +211,7 @@ def test_views_in_the_same_light_share_its_maps(frame: Any, scene: Any) -> None:
     groom, own = replace(grooms[0], lights=studio(camera)), frame.StrandPass()
     first = own.opacity(groom, view="a")
     assert own.opacity(groom, view="b") is first
-    other = replace(groom, lights=studio(turned(frame, 90.0)))
+    other = replace(groom, lights=studio(turned(90.0)))
     in_turn = [(own.opacity(other, view="b"), own.opacity(groom, view="a")) for _ in range(3)]
     assert all(maps is in_turn[0][0] and cached is in_turn[0][1] for maps, cached in in_turn)
     assert (in_turn[0][1].values == first.values).all()

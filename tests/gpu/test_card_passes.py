@@ -13,6 +13,8 @@ from flat_cards import camera, card, constant_textures
 
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.drawing_settings import CardDrawingSettings
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot
 from hairloom.addon.shading.card_look import mapped_normal
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
 from hairloom.addon.shading.lights import Light
@@ -128,7 +130,7 @@ def test_states_are_those_of_the_paper(
     shading = dataclasses.replace(LOOK["shading"], model=model)
     drawing = CardDrawingSettings(passes=scheme, skip_clear=False)
     frame.render_image(
-        snapshot_of(mesh_of(*STACK), hairy(), drawing, shading=shading), camera(frame), 8, 8, 1
+        snapshot_of(mesh_of(*STACK), hairy(), drawing, shading=shading), camera(), 8, 8, 1
     )
     found = tuple(
         (
@@ -161,7 +163,7 @@ def test_three_passes_draw_the_same_where_nothing_overlaps(frame: Any) -> None:
         (0.02, 0.02, 0.48, 0.48, 0.1), (0.98, 0.52, 0.52, 0.98, 0.3), (0.02, 0.52, 0.48, 0.98, 0.2)
     )
     four, three = (
-        frame.render_image(snapshot_of(apart, hairy(), drawing), camera(frame), SIZE, SIZE, 1)
+        frame.render_image(snapshot_of(apart, hairy(), drawing), camera(), SIZE, SIZE, 1)
         for drawing in (None, THREE)
     )
     opaque = four[..., 3] == 1.0
@@ -174,11 +176,9 @@ def test_three_passes_draw_the_same_where_nothing_overlaps(frame: Any) -> None:
 @pytest.mark.parametrize("drawing", [CardDrawingSettings(), THREE])
 def test_a_head_hides_cards_behind_it(frame: Any, drawing: CardDrawingSettings) -> None:
     wall = np.array([[0, 0.25, 0], [1, 0.25, 0], [1, 0.25, 1], [0, 0.25, 1]], np.float32)
-    head = frame.MeshSnapshot.of(
-        Surface(wall, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
-    )
+    head = MeshSnapshot.of(Surface(wall, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0))
     near = [each for each in STACK if each[4] < 0.25]
-    view = camera(frame)
+    view = camera()
     with_all, with_near = (
         frame.render_image(
             snapshot_of(mesh_of(*cards), hairy(), drawing, meshes=(head,)), view, SIZE, SIZE, 1
@@ -194,7 +194,7 @@ def test_a_head_hides_cards_behind_it(frame: Any, drawing: CardDrawingSettings) 
 def test_the_order_of_a_view_is_the_painters(frame: Any, y: float, passes: str) -> None:
     """For cards in any order in the mesh, seen from the front and from +y, from behind."""
     shuffled = [STACK[index] for index in (3, 0, 4, 2, 1)]
-    view = camera(frame, y)
+    view = camera(y)
     drawing = CardDrawingSettings(order="view", passes=passes)
     picture = frame.render_image(
         snapshot_of(mesh_of(*shuffled), hairy(), drawing), view, SIZE, SIZE, 1
@@ -209,7 +209,7 @@ def test_the_order_of_a_view_is_the_painters(frame: Any, y: float, passes: str) 
 
 def test_back_faces_have_an_order_of_their_own(frame: Any) -> None:
     """From behind, the order from the inside to the outside is nearest first."""
-    mesh, view = mesh_of(*STACK), camera(frame, 2.0)
+    mesh, view = mesh_of(*STACK), camera(2.0)
     expected = painted(frame, list(reversed(STACK)), view, hairy())
     # a card's two triangles do not overlap
     back = mesh.triangles[::-1]
@@ -235,15 +235,13 @@ def test_an_order_goes_up_only_when_it_changes(frame: Any, monkeypatch: Any) -> 
     mesh = mesh_of(*STACK)
     shown = snapshot_of(mesh, hairy(), drawing)
     moved = dataclasses.replace(mesh, positions=mesh.positions + np.float32(0.01))
-    near = frame.Camera(
-        frame.look_at((0.52, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, -3.0, 5.0)
-    )
+    near = Camera(look_at((0.52, -1.0, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, -3.0, 5.0))
     for snapshot, view, expected in (
-        (shown, camera(frame), 1),
-        (shown, camera(frame), 1),
+        (shown, camera(), 1),
+        (shown, camera(), 1),
         (shown, near, 1),
         (snapshot_of(moved, hairy(), drawing), near, 1),
-        (shown, camera(frame, 2.0), 2),
+        (shown, camera(2.0), 2),
     ):
         frame.render_image(snapshot, view, 8, 8, 1, card_pass=cards)
         assert len(made) == expected
@@ -262,7 +260,7 @@ def test_clear_pixels_hide_what_comes_later_only_without_the_test(frame: Any) ->
     for skip_clear, expected in ((True, 0.5), (False, 0.0)):
         drawing = CardDrawingSettings(skip_clear=skip_clear)
         shown = snapshot_of(mesh, textures, drawing)
-        picture = frame.render_image(shown, camera(frame), 8, 8, 1)
+        picture = frame.render_image(shown, camera(), 8, 8, 1)
         assert picture[..., 3] == pytest.approx(expected, abs=1e-3)
 
 
@@ -271,7 +269,7 @@ def test_a_normal_map_bends_the_normal(frame: Any) -> None:
     texel = np.float32((0.8, 0.6, 0.85))
     bent = constant_textures(noise=0.5, normal=np.broadcast_to(texel, (4, 4, 3)))
     sun = Light.sun((-0.6, 0.7, -0.2), (1.0, 1.0, 1.0), 3.0)
-    view, mesh = camera(frame), mesh_of((0.0, 0.0, 1.0, 1.0, 0.0))
+    view, mesh = camera(), mesh_of((0.0, 0.0, 1.0, 1.0, 0.0))
     light = {"lights": (sun,), "ambient": (0.0, 0.0, 0.0)}
     flat, mapped = (
         frame.render_image(snapshot_of(mesh, textures, **light), view, 8, 8, 1)[4, 4, :3]
@@ -300,11 +298,11 @@ def test_viewport_colors_are_encoded_before_they_are_premultiplied(frame: Any) -
     shown = snapshot_of(
         mesh_of((0.0, 0.0, 1.0, 1.0, 0.0)), constant_textures(alpha=0.5, noise=0.5), **dim
     )
-    linear = frame.render_image(shown, camera(frame), 8, 8, 1)[4, 4]
+    linear = frame.render_image(shown, camera(), 8, 8, 1)[4, 4]
     offscreen = gpu.types.GPUOffScreen(8, 8, format="RGBA32F")
     with offscreen.bind():
         gpu.state.active_framebuffer_get().clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-        CardPass().draw(shown, camera(frame), 8, 8, output="viewport")
+        CardPass().draw(shown, camera(), 8, 8, output="viewport")
     found = np.array(offscreen.texture_color.read()).reshape(8, 8, 4)[4, 4]
     offscreen.free()
     straight = linear[:3] / linear[3]

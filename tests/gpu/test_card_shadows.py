@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from flat_cards import camera, mesh_of, snapshot_of
 
-from hairloom.addon.render.snapshot import SKIN
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import SKIN, MeshSnapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.look import fibre_of, root_absorption, strand_angles
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
@@ -49,15 +50,15 @@ def textures_of(alpha: Any) -> HairTextures:
     return HairTextures(white, alpha, half, half, np.full((2, 2, 3), 0.5, np.float32))
 
 
-def behind(frame: Any) -> Any:
+def behind() -> Any:
     """A camera that sees the cards from the dark side, with x from right to left."""
-    return camera(frame, 3.0)
+    return camera(3.0)
 
 
 def drawn(frame: Any, mesh: Any, textures: Any, volume: VolumeSettings, **more: Any) -> np.ndarray:
     settings = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN, **more}
     snapshot = snapshot_of(mesh, textures, volume=volume, **settings)
-    picture: np.ndarray = frame.render_image(snapshot, behind(frame), SIZE, SIZE, 1)
+    picture: np.ndarray = frame.render_image(snapshot, behind(), SIZE, SIZE, 1)
     assert np.isfinite(picture).all()
     return picture
 
@@ -115,7 +116,7 @@ def test_a_card_thinner_than_a_texel_takes_its_part_of_soft_light(frame: Any, lo
                 ambient=(0.0, 0.0, 0.0),
                 shading=PLAIN,
             ),
-            behind(frame),
+            behind(),
             *(SIZE, SIZE, samples),
             center=np.full(3, 0.5),
             passes=(MeshPass(), StrandPass()),
@@ -142,9 +143,9 @@ def test_thin_cards_take_less_of_the_light(frame: Any, form: str) -> None:
     )
     thin = dataclasses.replace(snapshot.cards, thickness=0.25)
     shown = dataclasses.replace(snapshot, cards=thin)
-    found = frame.render_image(shown, behind(frame), SIZE, SIZE, 1)[16, :, 0]
+    found = frame.render_image(shown, behind(), SIZE, SIZE, 1)[16, :, 0]
     whole = dataclasses.replace(snapshot, volume=VolumeSettings(shadows="none"))
-    open_light = frame.render_image(whole, behind(frame), SIZE, SIZE, 1)[16, :, 0]
+    open_light = frame.render_image(whole, behind(), SIZE, SIZE, 1)[16, :, 0]
     assert found[20:30] / open_light[20:30] == pytest.approx(0.3**0.25, rel=0.02)
     assert found[2:12] == pytest.approx(open_light[2:12], rel=0.02)
 
@@ -174,7 +175,7 @@ def test_view_compensated_cards_shade_equally_from_all_sides_of_their_strands(
         )
         even = dataclasses.replace(snapshot.cards, is_view_compensated=True)
         shown = dataclasses.replace(snapshot, cards=even)
-        found.append(frame.render_image(shown, behind(frame), SIZE, SIZE, 1)[16, 14:18, 0])
+        found.append(frame.render_image(shown, behind(), SIZE, SIZE, 1)[16, 14:18, 0])
     left = 0.4 ** (2.0 / np.pi / np.cos(turn))
     assert found[1].min() > 0.01
     assert found[0] / found[1] == pytest.approx(left, rel=0.03)
@@ -195,7 +196,7 @@ def test_strands_of_a_deep_card_lie_in_front_of_the_visible_one(
     shown, bare = (
         frame.render_image(
             snapshot_of(mesh, textures_of([alpha, alpha]), volume=each, cards=even, **options),
-            camera(frame),
+            camera(),
             SIZE,
             SIZE,
             1,
@@ -229,7 +230,7 @@ def test_a_map_stores_how_deep_the_visible_strand_of_a_card_lies(
         shown, bare = (
             frame.render_image(
                 snapshot_of(mesh_of(each), textures, volume=light, cards=even, **options),
-                camera(frame),
+                camera(),
                 SIZE,
                 SIZE,
                 1,
@@ -256,7 +257,7 @@ def test_light_is_looked_up_at_the_visible_strand(frame: Any) -> None:
             ambient=(0.0, 0.0, 0.0),
             shading=PLAIN,
         )
-        row = frame.render_image(snapshot, camera(frame), 64, 64, 1)[32, :, 0]
+        row = frame.render_image(snapshot, camera(), 64, 64, 1)[32, :, 0]
         shade.append(row[24:28].mean() / row[44:56].mean())
     assert shade[0] < 0.6
     assert shade[1] > 0.95
@@ -287,18 +288,16 @@ def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> 
     def wall(y: float, low: float, high: float) -> Any:
         corners = np.array([[low, y, -1], [high, y, -1], [high, y, 2], [low, y, 2]], np.float32)
         surface = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
-        return frame.MeshSnapshot.of(surface, color=(0.5, 0.5, 0.5))
+        return MeshSnapshot.of(surface, color=(0.5, 0.5, 0.5))
 
     mesh, textures = mesh_of(card(0.0, 0.5, 0.0)), textures_of([0.6, 0.6])
     skin = wall(0.3, -1.0, 2.0)
-    front = frame.Camera(
-        frame.look_at((0.5, -3.0, 0.5), (0.5, 0.0, 0.5), up=(0.0, 0.0, 1.0)),
-        frame.orthographic(1.0, 1.0, 0.0, 9.0),
+    front = Camera(
+        look_at((0.5, -3.0, 0.5), (0.5, 0.0, 0.5), up=(0.0, 0.0, 1.0)),
+        orthographic(1.0, 1.0, 0.0, 9.0),
     )
     # the wall as seen past the cards
-    past = frame.Camera(
-        frame.look_at((2.5, -1.0, 0.5), (0.4, 0.3, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 9.0)
-    )
+    past = Camera(look_at((2.5, -1.0, 0.5), (0.4, 0.3, 0.5)), orthographic(1.0, 1.0, 0.0, 9.0))
 
     def seen(volume: VolumeSettings, camera: Any, **more: Any) -> np.ndarray:
         snapshot = snapshot_of(
@@ -372,7 +371,7 @@ def test_cards_gain_the_light_off_far_skin_of_the_reference(frame: Any) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
-def test_maps_are_drawn_again_only_when_something_changed(frame: Any) -> None:
+def test_maps_are_drawn_again_only_when_something_changed(gpu_context: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
     cards = CardPass()

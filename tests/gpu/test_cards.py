@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from flat_cards import camera, constant_textures, mesh_of, snapshot_of
 
+from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.snapshot import MeshSnapshot
 from hairloom.addon.shading.card_look import card_base, mapped_tangent
 from hairloom.addon.shading.kajiya_kay import kajiya_kay
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance
@@ -26,8 +28,8 @@ PLAIN = ShadingSettings(model="kajiya_kay", base_color=(1.0, 1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
-def front(frame: Any) -> Any:
-    return camera(frame)
+def front() -> Any:
+    return camera()
 
 
 #: a rectangle whose corners have different occlusion
@@ -264,9 +266,7 @@ def test_a_mesh_before_a_card_hides_it_and_one_behind_shines_through(
     frame: Any, front: Any
 ) -> None:
     square = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0, 1], [0, 0, 1]], np.float32)
-    blue = frame.MeshSnapshot.of(
-        Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
-    )
+    blue = MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0))
     mesh = dataclasses.replace(blue, specular=0.0)
     cards = mesh_of(card((0.0, 0.0), (1.0, 0.5), 0.3), card((0.0, 0.5), (1.0, 1.0), -0.3))
     picture = frame.render_image(
@@ -300,12 +300,12 @@ def test_equal_depth_loses_no_pixel(frame: Any) -> None:
     snapshot = snapshot_of(
         mesh_of(*cards), constant_textures(), ambient=(1.0, 1.0, 1.0), shading=PLAIN
     )
-    camera = frame.frame_camera(
+    camera = frame_camera(
         (np.full(3, -0.4), np.full(3, 0.4)), (0.3, -1.0, 0.2), np.radians(40), 1.0
     )
     picture = frame.render_image(snapshot, camera, 300, 300, 1)
     mesh = snapshot.cards.mesh
-    plain = frame.MeshSnapshot.of(Surface(mesh.positions, mesh.triangles))
+    plain = MeshSnapshot.of(Surface(mesh.positions, mesh.triangles))
     as_mesh = dataclasses.replace(snapshot, cards=None, meshes=(plain,))
     covered = frame.render_image(as_mesh, camera, 300, 300, 1)[..., 3] > 0.0
     assert 0.2 < covered.mean() < 0.9
@@ -330,7 +330,7 @@ def test_passes_keep_what_did_not_change(frame: Any, front: Any) -> None:
         assert alone[4, 4, 3] == 1.0
 
 
-def test_state_is_as_it_was_found(gpu_context: Any, frame: Any, front: Any) -> None:
+def test_state_is_as_it_was_found(gpu_context: Any, front: Any) -> None:
     from hairloom.addon.render.card_pass import CardPass
 
     snapshot = snapshot_of(mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0)), constant_textures(alpha=0.5))

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.settings import StrandSettings
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -115,8 +117,8 @@ def test_coverage_is_that_of_the_definition(
     )
     detail = DetailSettings(mode="fixed", subdivisions=subdivisions)
     radius = np.full(strands.shape[:2], 1e-3, np.float32)
-    snapshot = frame.Snapshot(strands, radius, strand_settings=settings, detail=detail)
-    camera = frame.frame_camera(
+    snapshot = Snapshot(strands, radius, strand_settings=settings, detail=detail)
+    camera = frame_camera(
         (strands.min((0, 1)), strands.max((0, 1))), (-0.5, -1.0, 0.4), np.radians(35.0), 1.2
     )
     drawn = frame.render_image(snapshot, camera, 360, 300, samples)[..., 3]
@@ -135,13 +137,13 @@ def test_coverage_of_the_real_groom(frame: Any, shared_data: Path) -> None:
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
     strands = groom.strands.grid[::5]
     radius = np.full(strands.shape[:2], 2e-4, np.float32)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands,
         radius,
         detail=DetailSettings(mode="fixed"),
         strand_settings=StrandSettings(transparency="none"),
     )
-    camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
+    camera = frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
     drawn = frame.render_image(snapshot, camera, 480, 360, 1)[..., 3]
     expected = covered(snapshot, camera, 480, 360)
     assert expected.mean() > 0.15

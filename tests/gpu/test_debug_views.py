@@ -23,7 +23,9 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.smooth import points_at
+from hairloom.addon.render.camera import Camera, look_at, orthographic
 from hairloom.addon.render.hair_ball import HairBall
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import Surface
 
@@ -36,16 +38,14 @@ OCCLUDER_SPHERES = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
 
 
 @pytest.fixture(scope="module")
-def front(frame: Any) -> Any:
+def front() -> Any:
     """An orthographic camera that shows x and z from -0.5 to 0.5 and looks along +y."""
-    return frame.Camera(
-        frame.look_at((0, -1, 0), (0, 0, 0)), frame.orthographic(1.0, 1.0, 0.1, 9.0)
-    )
+    return Camera(look_at((0, -1, 0), (0, 0, 0)), orthographic(1.0, 1.0, 0.1, 9.0))
 
 
-def snapshot_of(frame: Any, strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
+def snapshot_of(strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
     radius = np.full(strands.shape[:2], 5e-4, np.float32)
-    return frame.Snapshot(strands, radius, detail=detail, **more)
+    return Snapshot(strands, radius, detail=detail, **more)
 
 
 def chromaticity(pixel: np.ndarray) -> np.ndarray:
@@ -63,7 +63,6 @@ def test_the_detail_view_shows_factors_by_colour(
     for pieces, expected in ((1, [0.0, 0.04, 1.0]), (8, [0.02, 1.0, 0.0]), (64, [1.0, 0.0, 0.0])):
         detail = DetailSettings(mode="fixed", subdivisions=pieces)
         snapshot = snapshot_of(
-            frame,
             strands,
             detail,
             strand_settings=settings,
@@ -82,7 +81,6 @@ def test_the_detail_view_colours_each_segment_by_its_own_factor(frame: Any, fron
     strand[0, 20:, 0] = 0.02 * np.array([1, 0, 1, 0, 1])
     detail = dataclasses.replace(BARE, error=0.1)
     snapshot = snapshot_of(
-        frame,
         strand,
         detail,
         strand_settings=StrandSettings(fullness=20.0, tip_width=1.0),
@@ -109,7 +107,7 @@ def test_guides_and_groups_have_colours_of_their_own(frame: Any, front: Any, nam
     settings = StrandSettings(fullness=60.0, tip_width=1.0)
 
     def colors(**more: Any) -> np.ndarray:
-        snapshot = snapshot_of(frame, strands, BARE, strand_settings=settings, **more)
+        snapshot = snapshot_of(strands, BARE, strand_settings=settings, **more)
         picture = frame.render_image(snapshot, front, 80, 80, 1)
         return np.array([chromaticity(picture[40, 5 + 10 * place]) for place in range(8)])
 
@@ -127,7 +125,6 @@ def test_the_occlusion_view_shows_it_in_grey(frame: Any, front: Any) -> None:
     occlusion = np.array([[0.2, 0.6, 1.0]], np.float32)
     settings = StrandSettings(fullness=60.0, tip_width=1.0)
     snapshot = snapshot_of(
-        frame,
         strands,
         BARE,
         strand_settings=settings,
@@ -167,9 +164,7 @@ def test_stretch_is_red_where_segments_are_longer_and_blue_where_they_are_shorte
     )[:, None]
 
     def shown(**more: Any) -> np.ndarray:
-        snapshot = snapshot_of(
-            frame, strands, BARE, strand_settings=WIDE, debug_view="stretch", **more
-        )
+        snapshot = snapshot_of(strands, BARE, strand_settings=WIDE, debug_view="stretch", **more)
         picture = frame.render_image(snapshot, front, 80, 80, 1)
         return np.array(
             [
@@ -207,7 +202,6 @@ def test_depth_is_the_distance_from_colliders(
         mesh = Surface(*ball_mesh(64, radius))
         solids = (DistanceField.from_surface(mesh, DynamicsSettings()),)
     snapshot = snapshot_of(
-        frame,
         strands,
         BARE,
         strand_settings=WIDE,
@@ -231,8 +225,6 @@ def test_depth_is_the_distance_from_colliders(
 
 
 def test_without_colliders_depth_is_grey(frame: Any, front: Any) -> None:
-    snapshot = snapshot_of(
-        frame, upright_strands(4, 3), BARE, strand_settings=WIDE, debug_view="depth"
-    )
+    snapshot = snapshot_of(upright_strands(4, 3), BARE, strand_settings=WIDE, debug_view="depth")
     pixel = frame.render_image(snapshot, front, 80, 80, 1)[40, 10]
     assert pixel[:3].max() > 0.1 and chromaticity(pixel) == pytest.approx([1.0, 1.0, 1.0], abs=0.01)

@@ -17,6 +17,8 @@ from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.detail import stations as stations_of
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.thinning import even_ranks
+from hairloom.addon.render.camera import Camera, frame_camera, look_at, orthographic, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands import Surface
@@ -47,25 +49,23 @@ def curly(strand_count: int, cv_count: int) -> np.ndarray:
     return (out * (0.1 + 0.2 * fraction) + waves).astype(np.float32)
 
 
-def snapshot_of(frame: Any, strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
+def snapshot_of(strands: np.ndarray, detail: DetailSettings, **more: Any) -> Any:
     """A snapshot of opaque strands, whose coverage shows their places."""
     radius = np.full(strands.shape[:2], 5e-4, np.float32)
     settings = {"strand_settings": StrandSettings(transparency="none"), **more}
-    return frame.Snapshot(strands, radius, detail=detail, **settings)
+    return Snapshot(strands, radius, detail=detail, **settings)
 
 
-def cameras(frame: Any) -> dict[str, Any]:
+def cameras() -> dict[str, Any]:
     """Cameras far away, so near that strands pass the eye, and without perspective."""
     aspect = WIDTH / HEIGHT
     return {
-        "whole": frame.Camera(
-            frame.look_at((0.3, -1.0, 0.2), (0, 0, 0)), frame.perspective(0.6, aspect, 0.1, 5.0)
+        "whole": Camera(look_at((0.3, -1.0, 0.2), (0, 0, 0)), perspective(0.6, aspect, 0.1, 5.0)),
+        "inside": Camera(
+            look_at((0.05, -0.2, 0.05), (0, 0, 0)), perspective(0.9, aspect, 0.01, 5.0)
         ),
-        "inside": frame.Camera(
-            frame.look_at((0.05, -0.2, 0.05), (0, 0, 0)), frame.perspective(0.9, aspect, 0.01, 5.0)
-        ),
-        "orthographic": frame.Camera(
-            frame.look_at((0.3, -1.0, 0.2), (0, 0, 0)), frame.orthographic(0.4, aspect, 0.1, 5.0)
+        "orthographic": Camera(
+            look_at((0.3, -1.0, 0.2), (0, 0, 0)), orthographic(0.4, aspect, 0.1, 5.0)
         ),
     }
 
@@ -74,10 +74,9 @@ def computed(
     strands: np.ndarray, camera: Any, detail: DetailSettings, **more: Any
 ) -> tuple[np.ndarray, Any]:
     """The GPU's factors (strand_count, cv_count - 1) and its order of strands."""
-    from hairloom.addon.render import frame
     from hairloom.addon.render.detail_pass import DetailPass
 
-    snapshot = snapshot_of(frame, strands, detail, **more)
+    snapshot = snapshot_of(strands, detail, **more)
     order = DetailPass().order(snapshot, point_textures(snapshot), 1, camera, (WIDTH, HEIGHT))
     return read_factors(order, *strands.shape[:2]), order
 
@@ -86,13 +85,13 @@ def computed(
 @pytest.mark.parametrize("seen", ["whole", "inside", "orthographic"])
 @pytest.mark.parametrize("mode", ["adaptive", "heuristic", "fixed"])
 def test_factors_and_culling_are_those_of_numpy(
-    frame: Any, mode: str, seen: str, cv_count: int
+    gpu_context: Any, mode: str, seen: str, cv_count: int
 ) -> None:
     """Except for values exactly between two factors, where rounding decides.
 
     The curvature of a straight segment that passes within 2 cm of the eye's plane is only rounding.
     """
-    strands, camera = curly(700, cv_count), cameras(frame)[seen]
+    strands, camera = curly(700, cv_count), cameras()[seen]
     most = 5 if mode == "fixed" else 60  # a setting that the mode "fixed" ignores
     detail = DetailSettings(
         mode=mode, error=0.05, piece_length=2.0, subdivisions=7, max_subdivisions=most
@@ -113,8 +112,8 @@ def test_factors_and_culling_are_those_of_numpy(
 
 
 @pytest.mark.parametrize("seen", ["whole", "inside", "orthographic"])
-def test_strands_that_face_away_are_those_of_numpy(frame: Any, seen: str) -> None:
-    strands, camera = curly(2000, 5) + np.float32(0.3), cameras(frame)[seen]
+def test_strands_that_face_away_are_those_of_numpy(gpu_context: Any, seen: str) -> None:
+    strands, camera = curly(2000, 5) + np.float32(0.3), cameras()[seen]
     detail = dataclasses.replace(BARE, culling="away")
     _, order = computed(strands, camera, detail)
     roots = strands[:, 0]
@@ -135,9 +134,9 @@ def drawn_of(order: Any) -> np.ndarray:
     return np.sort(strands)
 
 
-def test_factors_of_more_strands_than_a_texture_has_rows(frame: Any) -> None:
+def test_factors_of_more_strands_than_a_texture_has_rows(gpu_context: Any) -> None:
     strands = curly(20_000, 19)
-    camera = cameras(frame)["whole"]
+    camera = cameras()["whole"]
     found, order = computed(strands, camera, BARE)
     expected = detail_factors(
         strands, PictureView(camera.view, camera.projection, WIDTH, HEIGHT), BARE
@@ -148,11 +147,11 @@ def test_factors_of_more_strands_than_a_texture_has_rows(frame: Any) -> None:
 
 @pytest.mark.parametrize("cv_count", [2, 16, 40, 130])
 def test_stations_are_those_of_the_cpu(
-    frame: Any, compute: Callable[..., np.ndarray], cv_count: int
+    gpu_context: Any, compute: Callable[..., np.ndarray], cv_count: int
 ) -> None:
     """To 1e-5 of the hair's length; stations beyond the tip are at the tip."""
     strands = curly(200, cv_count)
-    camera = cameras(frame)["inside"]
+    camera = cameras()["inside"]
     view = PictureView(camera.view, camera.projection, WIDTH, HEIGHT)
     factors = detail_factors(strands, view, BARE)
     totals = stations_of(factors)[:, -1]
@@ -187,9 +186,9 @@ def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None
     Chords are shorter than their curves, and a ribbon narrows a little where they join: the tight
     curls of this groom lose 2.5 % of their coverage, Sintel's hair 0.1 %.
     """
-    strands, camera = curly(150, 16), cameras(frame)[seen]
+    strands, camera = curly(150, 16), cameras()[seen]
     fine, adaptive, finer = (
-        frame.render_image(snapshot_of(frame, strands, detail), camera, WIDTH, HEIGHT, 4)[..., 3]
+        frame.render_image(snapshot_of(strands, detail), camera, WIDTH, HEIGHT, 4)[..., 3]
         for detail in (FIXED_64, BARE, dataclasses.replace(BARE, error=0.02))
     )
     assert fine.mean() > 0.05
@@ -212,12 +211,10 @@ def test_a_bent_ribbon_has_no_hole(frame: Any) -> None:
     strand = np.stack([np.sin(angle) * 0.3, 0.0 * angle, angle / 2.0 / np.pi - 0.5], axis=-1)
     strands = strand[None].astype(np.float32)
     settings = StrandSettings(fullness=40.0, tip_width=1.0, transparency="none")
-    camera = frame.Camera(
-        frame.look_at((0, -1, 0), (0, 0, 0)), frame.orthographic(1.2, WIDTH / HEIGHT, 0.1, 3.0)
-    )
+    camera = Camera(look_at((0, -1, 0), (0, 0, 0)), orthographic(1.2, WIDTH / HEIGHT, 0.1, 3.0))
     fine, adaptive = (
         frame.render_image(
-            snapshot_of(frame, strands, detail, strand_settings=settings), camera, WIDTH, HEIGHT, 4
+            snapshot_of(strands, detail, strand_settings=settings), camera, WIDTH, HEIGHT, 4
         )[..., 3]
         for detail in (FIXED_64, BARE)
     )
@@ -235,8 +232,8 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
     monkeypatch.setattr(
         detail_pass, "detail_classes", lambda *found: computations.append(1) or classes(*found)
     )
-    snapshot = snapshot_of(frame, curly(300, 16), BARE)
-    one, other = cameras(frame)["whole"], cameras(frame)["inside"]
+    snapshot = snapshot_of(curly(300, 16), BARE)
+    one, other = cameras()["whole"], cameras()["inside"]
     alone = [frame.render_image(snapshot, camera, *size, 1) for camera in (one, other)]
     passes = frame.MeshPass(), frame.StrandPass()
 
@@ -285,7 +282,7 @@ def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
     no_guide = GuideWeights(np.zeros((200, 3), np.int32), np.zeros((200, 3), np.float32))
     riders = Riders.of(strands, strands.grid[:1], no_guide)
     ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], riders)
-    snapshot = snapshot_of(frame, grid, BARE, device_points=ride.points)
+    snapshot = snapshot_of(grid, BARE, device_points=ride.points)
     passes, counts = (frame.MeshPass(), frame.StrandPass()), []
     for distance in (3.0, 0.0, 0.0, 3.0):
         matrix = np.eye(4)
@@ -293,7 +290,7 @@ def test_points_that_the_gpu_moves_get_new_detail(frame: Any) -> None:
         before = ride.points.serial
         ride.carry(None, matrix)
         assert ride.points.serial > before
-        frame.render_image(snapshot, cameras(frame)["whole"], WIDTH, HEIGHT, 1, passes=passes)
+        frame.render_image(snapshot, cameras()["whole"], WIDTH, HEIGHT, 1, passes=passes)
         counts.append(passes[1].statistics.pieces)
     assert counts[0] == counts[3] < counts[1] == counts[2]
 
@@ -306,11 +303,11 @@ def test_statistics_are_what_was_drawn(frame: Any) -> None:
     strands[..., 0] = np.arange(4)[:, None] * 0.02
     strands[..., 2] = np.linspace(0.0, 0.1, 5)
     strands[3, 2, 1] = 0.02
-    camera = cameras(frame)["whole"]
+    camera = cameras()["whole"]
 
     def statistics(detail: DetailSettings, strands: np.ndarray = strands) -> Statistics:
         passes = frame.MeshPass(), frame.StrandPass()
-        snapshot = snapshot_of(frame, strands, detail)
+        snapshot = snapshot_of(strands, detail)
         frame.render_image(snapshot, camera, WIDTH, HEIGHT, 1, passes=passes)
         return passes[1].statistics
 
@@ -328,7 +325,7 @@ def test_statistics_are_what_was_drawn(frame: Any) -> None:
 
 
 def test_detail_is_counted_in_pixels_of_the_final_picture(frame: Any) -> None:
-    snapshot, camera = snapshot_of(frame, curly(100, 16), BARE), cameras(frame)["whole"]
+    snapshot, camera = snapshot_of(curly(100, 16), BARE), cameras()["whole"]
     passes = frame.MeshPass(), frame.StrandPass()
     pieces = []
     for samples in (1, 3):
@@ -349,12 +346,12 @@ def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data:
     groom = read_tfx(shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx")
     strands = groom.strands.grid
     rank = even_ranks(strands[:, 0])
-    camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
+    camera = frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
     thinned = dataclasses.replace(BARE, lod_size=1e5, min_density=0.125)
     for height in (144, 72, 45):
         passes, covered = (frame.MeshPass(), frame.StrandPass()), []
         for detail in (BARE, thinned):
-            snapshot = snapshot_of(frame, strands, detail, rank=rank)
+            snapshot = snapshot_of(strands, detail, rank=rank)
             picture = frame.render_image(
                 snapshot, camera, height * 4 // 3, height, 4, passes=passes
             )
@@ -364,11 +361,11 @@ def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data:
         assert covered[1] == pytest.approx(covered[0], rel=0.03)
 
 
-def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
+def test_thinned_strands_are_those_of_low_rank_and_fade(gpu_context: Any) -> None:
     """As the groom gets smaller, each strand gets thinner before it disappears."""
     strands = curly(400, 5)
     rank = np.random.default_rng(7).permutation(400) / 400.0
-    camera, fractions = cameras(frame)["whole"], []
+    camera, fractions = cameras()["whole"], []
     for lod_size in (100.0, 250.0, 400.0, 1000.0):
         detail = dataclasses.replace(BARE, lod_size=lod_size)
         _, order = computed(strands, camera, detail, rank=rank)
@@ -384,10 +381,10 @@ def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> 
     """A scaled instance, as the render engine places it, keeps the same ranks as a groom of that
     size."""
     strands, rank = curly(400, 5), np.random.default_rng(7).permutation(400) / 400.0
-    detail, camera = dataclasses.replace(BARE, lod_size=1000.0), cameras(frame)["whole"]
-    small = snapshot_of(frame, strands * np.float32(0.2), detail, rank=rank)
+    detail, camera = dataclasses.replace(BARE, lod_size=1000.0), cameras()["whole"]
+    small = snapshot_of(strands * np.float32(0.2), detail, rank=rank)
     small = dataclasses.replace(small, radius=small.radius * np.float32(0.2))
-    large = snapshot_of(frame, strands, detail, rank=rank)
+    large = snapshot_of(strands, detail, rank=rank)
 
     def drawn(passes: Any, snapshot: Any) -> int:
         frame.render_image(snapshot, camera, WIDTH, HEIGHT, 1, passes=passes)
@@ -399,7 +396,7 @@ def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> 
     assert [drawn(passes, each) for each in (small, large, small)] == [*fresh, fresh[0]]
 
 
-def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
+def head_of_hair(detail: DetailSettings) -> Any:
     """A ball with short and long curly hair all around, and the occluder spheres inside it."""
     around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 49), np.linspace(0.0, np.pi, 25))
     positions = 0.1 * np.stack(
@@ -412,11 +409,10 @@ def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
     strands = curly(1000, 8)
     strands[::2] = strands[::2, :1] + (strands[::2] - strands[::2, :1]) * np.float32(0.3)
     return snapshot_of(
-        frame,
         strands,
         detail,
-        meshes=(frame.MeshSnapshot.of(ball),),
-        lights=three_point_lights(cameras(frame)["whole"].view),
+        meshes=(MeshSnapshot.of(ball),),
+        lights=three_point_lights(cameras()["whole"].view),
         occluder_spheres=np.array([[0.0, 0.0, 0.0, 0.098]], np.float32),
     )
 
@@ -424,10 +420,10 @@ def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
 @pytest.mark.parametrize("seen", few_in_commits(["inside", "whole", "orthographic"]))
 @pytest.mark.parametrize("mode", few_in_commits(["adaptive", "fixed"]))
 def test_hidden_strands_change_no_pixel(frame: Any, mode: str, seen: str) -> None:
-    camera, pictures, strands = cameras(frame)[seen], [], []
+    camera, pictures, strands = cameras()[seen], [], []
     for culling in ("none", "hidden"):
         passes = frame.MeshPass(), frame.StrandPass()
-        snapshot = head_of_hair(frame, dataclasses.replace(BARE, mode=mode, culling=culling))
+        snapshot = head_of_hair(dataclasses.replace(BARE, mode=mode, culling=culling))
         pictures.append(frame.render_image(snapshot, camera, 160, 120, 1, passes=passes))
         strands.append(passes[1].statistics.strands)
     assert (pictures[0] == pictures[1]).all()
@@ -440,19 +436,16 @@ def test_all_strands_may_be_hidden(frame: Any) -> None:
     strands[:, :, 1] = [0.5, 0.6, 0.7]
     passes = frame.MeshPass(), frame.StrandPass()
     snapshot = snapshot_of(
-        frame,
         strands,
         DetailSettings(),
         occluder_spheres=np.array([[0.0, 0.0, 0.0, 0.3]], np.float32),
     )
-    camera = frame.Camera(
-        frame.look_at((0.0, -1.0, 0.0), (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0)
-    )
+    camera = Camera(look_at((0.0, -1.0, 0.0), (0, 0, 0)), perspective(0.6, 1.0, 0.1, 5.0))
     assert not frame.render_image(snapshot, camera, 30, 30, 1, passes=passes).any()
     assert passes[1].statistics.strands == 0
 
 
-def test_snapshots_refuse_detail_that_does_not_fit(frame: Any) -> None:
+def test_snapshots_refuse_detail_that_does_not_fit() -> None:
     strands = curly(3, 4)
     for name, value in (
         ("guide", np.zeros(2, int)),
@@ -463,4 +456,4 @@ def test_snapshots_refuse_detail_that_does_not_fit(frame: Any) -> None:
         ("debug_view", "pieces"),
     ):
         with pytest.raises(ValueError, match=name):
-            snapshot_of(frame, strands, BARE, **{name: value})
+            snapshot_of(strands, BARE, **{name: value})

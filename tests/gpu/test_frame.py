@@ -10,6 +10,8 @@ import pytest
 from gpu_rounding import is_same, tolerance
 from tiers import few_in_commits
 
+from hairloom.addon.render.camera import Camera, frame_camera, look_at, orthographic, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.kajiya_kay import kajiya_kay, strand_base, strand_normal
 from hairloom.addon.shading.lights import Light, light_at, light_irradiance
@@ -31,11 +33,9 @@ RIBBON = StrandSettings(fullness=1.0, tip_width=1.0, minimum_width=0.0)
 
 
 @pytest.fixture(scope="module")
-def front(frame: Any) -> Any:
+def front() -> Any:
     """An orthographic camera that shows x and z from 0 to 1 and looks along +y."""
-    return frame.Camera(
-        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
-    )
+    return Camera(look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, 0.0, 3.0))
 
 
 def uprights(x: np.ndarray, radius: float, y: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +55,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         Light.point((0.3, -0.4, 0.5), (0.5, 0.7, 1.0), 8.0),
     )
     center, ambient = np.array([0.0, 0.5, -0.3], np.float32), (0.1, 0.2, 0.3)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strand,
         radius,
         occlusion,
@@ -68,7 +68,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         volume_center=center,
     )
     eye = np.array([0.05, -0.6, 0.2])
-    camera = frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0))
+    camera = Camera(look_at(eye, (0, 0, 0)), perspective(0.6, 1.0, 0.1, 5.0))
     picture = frame.render_image(snapshot, camera, 301, 301, 1)
 
     from hairloom.addon.shading.strand_noise import strand_noise
@@ -93,7 +93,7 @@ def test_a_pixel_has_the_colour_of_the_reference(frame: Any) -> None:
         assert picture[row, column, 3] == 1.0
 
 
-def hairy_sphere(frame: Any, **shading: float) -> Any:
+def hairy_sphere(**shading: float) -> Any:
     """A unit sphere with hair down its meridians, and a sun behind the eye at the same height."""
     around = np.radians(np.arange(0.0, 360.0, 0.6))[:, None]
     polar = np.radians(np.linspace(20.0, 160.0, 24))[None, :]
@@ -106,7 +106,7 @@ def hairy_sphere(frame: Any, **shading: float) -> Any:
         axis=-1,
     ).astype(np.float32)
     values = PLAIN.as_dict() | {"primary_color": (1.0, 1.0, 1.0), "primary_exponent": 120.0}
-    return frame.Snapshot(
+    return Snapshot(
         strands,
         np.full(strands.shape[:2], 0.012, np.float32),
         lights=(Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0),),
@@ -121,12 +121,10 @@ def hairy_sphere(frame: Any, **shading: float) -> Any:
 @pytest.mark.parametrize("shift", few_in_commits([0.3, 0.15, 0.0, -0.15, -0.3]))
 def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float) -> None:
     """With roots at the top and tips at the bottom, the band moves down by atan(shift)."""
-    camera = frame.Camera(
-        frame.look_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(2.2, 1.0, 1.0, 9.0)
-    )
+    camera = Camera(look_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0)), orthographic(2.2, 1.0, 1.0, 9.0))
     rows = (np.arange(150) + 0.5) / 150 * 2.2 - 1.1
-    lit = hairy_sphere(frame, primary_strength=4.0, primary_shift=shift)
-    matt = hairy_sphere(frame)
+    lit = hairy_sphere(primary_strength=4.0, primary_shift=shift)
+    matt = hairy_sphere()
     middle = slice(70, 80)
     band = frame.render_image(lit, camera, 150, 150, 2)[:, middle, 1].mean(axis=1)
     band -= frame.render_image(matt, camera, 150, 150, 2)[:, middle, 1].mean(axis=1)
@@ -138,14 +136,12 @@ def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float
 def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
     """Strands before and behind a square over the left half."""
     square = np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0, 1], [0, 0, 1]], np.float32)
-    blue = frame.MeshSnapshot.of(
-        Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0)
-    )
+    blue = MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 1.0))
     mesh = dataclasses.replace(blue, specular=0.0)
     x = np.array([0.1, 0.3, 0.6, 0.8])
     strands, radius = uprights(x, 0.02)
     strands[[0, 2], :, 1], strands[[1, 3], :, 1] = -0.5, 0.5
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands,
         radius,
         meshes=(mesh,),
@@ -168,10 +164,10 @@ def test_both_sides_of_a_mesh_are_lit_alike(frame: Any, front: Any, side: float)
     square = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]])[:, :: int(side)])
     normals = square.vertex_normals()
     assert np.sign(normals[0, 1]) == -side
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         np.zeros((0, 2, 3), np.float32),
         np.zeros((0, 2), np.float32),
-        meshes=(frame.MeshSnapshot(square, normals, (0.8, 0.5, 0.2), specular=0.0),),
+        meshes=(MeshSnapshot(square, normals, (0.8, 0.5, 0.2), specular=0.0),),
         lights=(Light.sun((0.0, 1.0, -1.0), (1.0, 1.0, 1.0), 3.0),),
         ambient=(0.0, 0.0, 0.0),
     )
@@ -187,7 +183,7 @@ def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
     strands[..., 0] = x.reshape(-1, 1)
     strands[..., 2] = z.reshape(-1, 1) + np.array([-0.004, 0.0, 0.004])
     occlusion = np.repeat(((np.arange(len(strands)) % 977) / 977)[:, None], 3, axis=1)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands,
         np.full(strands.shape[:2], 0.0015, np.float32),
         occlusion.astype(np.float32),
@@ -195,9 +191,7 @@ def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
         shading=PLAIN,
         strand_settings=RIBBON,
     )
-    camera = frame.Camera(
-        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
-    )
+    camera = Camera(look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, 0.0, 3.0))
     picture = frame.render_image(snapshot, camera, columns * 5, rows * 5, 1)
     middle = picture[2::5, 2::5]
     assert (middle[..., 3] == 1.0).all()
@@ -214,7 +208,7 @@ def test_more_strands_than_a_texture_can_hold() -> None:
 
 
 def test_no_strands_leave_the_background(frame: Any, front: Any) -> None:
-    none = frame.Snapshot(np.zeros((0, 4, 3), np.float32), np.zeros((0, 4), np.float32))
+    none = Snapshot(np.zeros((0, 4, 3), np.float32), np.zeros((0, 4), np.float32))
     background = (0.25, 0.5, 0.75, 1.0)
     picture = frame.render_image(none, front, 8, 6, 2, background=background)
     assert picture.shape == (6, 8, 4) and picture.dtype == np.float32
@@ -225,11 +219,9 @@ def test_two_frames_are_identical_and_passes_may_be_kept(frame: Any) -> None:
     from hairloom.addon.render.mesh_pass import MeshPass
     from hairloom.addon.render.strand_pass import StrandPass
 
-    snapshot = hairy_sphere(frame, primary_strength=2.0)
+    snapshot = hairy_sphere(primary_strength=2.0)
     moved = dataclasses.replace(snapshot, points=snapshot.points * np.float32(0.5))
-    camera = frame.frame_camera(
-        (np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0
-    )
+    camera = frame_camera((np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0)
     first = frame.render_image(snapshot, camera, 120, 120)
     assert is_same(frame.render_image(snapshot, camera, 120, 120), first)
     passes = MeshPass(), StrandPass()
@@ -249,7 +241,7 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.strands import StrandSet
 
-    sphere = hairy_sphere(frame, primary_strength=2.0)
+    sphere = hairy_sphere(primary_strength=2.0)
     count, cv_count = sphere.strand_count, sphere.layout.cv_count
     strands = StrandSet(
         points=sphere.points,
@@ -262,9 +254,7 @@ def test_points_on_the_gpu_look_like_uploaded_ones(frame: Any) -> None:
     ride = RidePass(strands, None, np.zeros(1, np.int32), strands.grid[:1], riders)
     turn = np.eye(4)
     turn[:3, :3] = [[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]
-    camera = frame.frame_camera(
-        (np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0
-    )
+    camera = frame_camera((np.full(3, -1.0), np.full(3, 1.0)), (0.2, -1, 0.3), np.radians(30), 1.0)
     passes = frame.MeshPass(), StrandPass()
     for matrix, largest, share in (
         (np.eye(4), tolerance(0.0, 1.0e-6), 0.0),
@@ -291,8 +281,8 @@ def test_points_on_the_gpu_that_do_not_fit_or_are_gone_are_refused(frame: Any, f
 
     strands, radius = uprights(np.array([0.5, 0.6]), 0.1)
     with pytest.raises(ValueError, match="device_points"):
-        frame.Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(3, 2)))
-    gone = frame.Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(2, 2)))
+        Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(3, 2)))
+    gone = Snapshot(strands, radius, device_points=DevicePoints(StrandLayout.uniform(2, 2)))
     with pytest.raises(ShaderError, match="released"):
         frame.render_image(gone, front, 8, 8)
 
@@ -302,7 +292,7 @@ def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> No
     strands, radius = uprights(np.array([0.25, 0.75]), 1e-6)
     for samples, width in ((1, 2.0), (4, 0.5), (4, 1.0)):
         settings = dataclasses.replace(RIBBON, minimum_width=width, transparency="none")
-        snapshot = frame.Snapshot(strands, radius, strand_settings=settings)
+        snapshot = Snapshot(strands, radius, strand_settings=settings)
         drawn = frame.render_image(snapshot, front, 40, 40, samples)[..., 3]
         assert drawn.sum(axis=1) == pytest.approx(np.full(40, 2.0 * width))
 
@@ -316,7 +306,7 @@ def test_strands_are_as_wide_where_pixels_are_not_square(
     settings = dataclasses.replace(RIBBON, transparency=transparency)
     for direction in ((0.0, 0.0, 0.6), (0.6, 0.0, 0.0), (0.4, 0.0, 0.4)):
         strand = np.array([0.2, 0.0, 0.2]) + np.array([[0.0], [1.0]]) * direction
-        snapshot = frame.Snapshot(
+        snapshot = Snapshot(
             strand[None].astype(np.float32),
             np.full((1, 2), 0.06, np.float32),
             strand_settings=settings,
@@ -334,7 +324,7 @@ def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
     strands, radius = uprights(np.array([0.5]), 0.05)
     settings = dataclasses.replace(RIBBON, fullness=2.0, tip_width=0.25)
     drawn = frame.render_image(
-        frame.Snapshot(strands, radius, strand_settings=settings), front, 100, 100, 4
+        Snapshot(strands, radius, strand_settings=settings), front, 100, 100, 4
     )[..., 3]
     width = drawn.sum(axis=1) / 100.0
     height = (np.arange(100) + 0.5) / 100.0
@@ -344,7 +334,7 @@ def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
 def test_samples_are_averaged_premultiplied(frame: Any, front: Any) -> None:
     """A half-covered white pixel is half white with an alpha of 0.5, over any background."""
     strands, radius = uprights(np.array([0.25]), 0.1250)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands, radius, ambient=(1.0, 1.0, 1.0), shading=PLAIN, strand_settings=RIBBON
     )
     picture = frame.render_image(snapshot, front, 4, 4, 4)
@@ -358,25 +348,23 @@ def test_impossible_sizes_are_refused(frame: Any, front: Any) -> None:
     strands, radius = uprights(np.array([0.5]), 0.1)
     for width, height, samples in ((0, 4, 1), (4, 4, 0), (9000, 4, 2)):
         with pytest.raises(ValueError, match="picture"):
-            frame.render_image(frame.Snapshot(strands, radius), front, width, height, samples)
+            frame.render_image(Snapshot(strands, radius), front, width, height, samples)
 
 
-def test_snapshots_refuse_arrays_that_do_not_fit(frame: Any) -> None:
+def test_snapshots_refuse_arrays_that_do_not_fit() -> None:
     strands, radius = uprights(np.array([0.5, 0.6]), 0.1)
     with pytest.raises(ValueError, match="occlusion"):
-        frame.Snapshot(strands, radius, np.ones((2, 3)))
+        Snapshot(strands, radius, np.ones((2, 3)))
     with pytest.raises(ValueError, match="strands"):
-        frame.Snapshot(strands[:, :1], radius[:, :1])
+        Snapshot(strands[:, :1], radius[:, :1])
 
 
 def test_strands_around_and_behind_the_eye(frame: Any) -> None:
     """No strand fills the picture when hair passes through the camera."""
     strands, radius = uprights(np.array([0.0]), 0.001)
     strands[0] = [[0.02, -1.0, 0.0], [0.02, 1.0, 0.0]]
-    snapshot = frame.Snapshot(strands, radius, strand_settings=RIBBON)
-    camera = frame.Camera(
-        frame.look_at((0, 0, 0), (0, 1, 0)), frame.perspective(1.0, 1.0, 0.01, 10)
-    )
+    snapshot = Snapshot(strands, radius, strand_settings=RIBBON)
+    camera = Camera(look_at((0, 0, 0), (0, 1, 0)), perspective(1.0, 1.0, 0.01, 10))
     drawn = frame.render_image(snapshot, camera, 100, 100, 1)[..., 3]
     assert drawn.any() and drawn[:, :49].sum() == 0.0
     assert drawn[:44].sum() == 0.0 and drawn[56:].sum() == 0.0

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.render import gpu_memory, gpu_objects
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -31,11 +33,11 @@ def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture
-def hair(frame: Any) -> Any:
+def hair() -> Any:
     """Strands across the picture, at all depths, with shadows."""
     random = np.random.default_rng(1)
     ends = random.uniform(-1.0, 1.0, (3000, 2, 3)).astype(np.float32)
-    return frame.Snapshot(
+    return Snapshot(
         ends,
         np.full(ends.shape[:2], 0.02, np.float32),
         ambient=(0.5, 0.5, 0.5),
@@ -46,10 +48,8 @@ def hair(frame: Any) -> Any:
     )
 
 
-def view_of(frame: Any) -> Any:
-    return frame.Camera(
-        frame.look_at((0.0, -10.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(2.0, 1.0, 0.0, 20.0)
-    )
+def view_of() -> Any:
+    return Camera(look_at((0.0, -10.0, 0.0), (0.0, 0.0, 0.0)), orthographic(2.0, 1.0, 0.0, 20.0))
 
 
 @pytest.fixture
@@ -62,7 +62,7 @@ def drawn(frame: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], tuple[
     def picture(snapshot: Any) -> tuple[np.ndarray, Any]:
         monkeypatch.setattr(strand_pass, "LAYERS_OF_PIXELS", StrandLayers())
         passes = MeshPass(), strand_pass.StrandPass()
-        image = frame.render_image(snapshot, view_of(frame), SIZE, SIZE, 1, passes=passes)
+        image = frame.render_image(snapshot, view_of(), SIZE, SIZE, 1, passes=passes)
         return image, passes[1].statistics.layers
 
     return picture
@@ -145,7 +145,7 @@ def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any)
 
     def notes(count: int) -> tuple[str, ...]:
         with gpu_memory.shared_by(count):
-            frame.render_image(hair, view_of(frame), SIZE, SIZE, 1, passes=passes)
+            frame.render_image(hair, view_of(), SIZE, SIZE, 1, passes=passes)
         return tuple(passes[1].statistics.notes)
 
     assert notes(1) == ()

@@ -17,6 +17,8 @@ from tiers import few_in_commits
 
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import read_any_preset
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -38,14 +40,14 @@ def draw() -> Callable[..., np.ndarray]:
 
     strands = combed_strands(12_000, cv_count=8, lift=0.004)
     radius = np.full(strands.shape[:2], 0.006, np.float32)
-    ball = replace(frame.MeshSnapshot.of(Surface(*ball_mesh()), color=BLACK), specular=0.0)
-    camera = frame.Camera(
-        frame.look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
-        frame.orthographic(HEIGHT, 1.0, 1.0, 9.0),
+    ball = replace(MeshSnapshot.of(Surface(*ball_mesh()), color=BLACK), specular=0.0)
+    camera = Camera(
+        look_at((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(HEIGHT, 1.0, 1.0, 9.0),
     )
 
     def draw(shading: ShadingSettings, shines_along: tuple[float, ...]) -> np.ndarray:
-        snapshot = frame.Snapshot(
+        snapshot = Snapshot(
             strands,
             radius,
             meshes=(ball,),

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.area_lights import Panel
 from hairloom.addon.shading.lights import Cone, Light, kinds_needed
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -46,17 +48,15 @@ def test_light_kinds_that_are_left_out_would_add_nothing(
     places = np.broadcast_arrays(x + 0.3 * along, 0.2 * along, 0.5 * z + along)
     strands = np.stack(places, axis=-1).astype(np.float32)
     wall = np.array([[-3, 1, -3], [3, 1, -3], [3, 1, 3], [-3, 1, 3]], np.float32)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands,
         np.full(strands.shape[:2], 0.02, np.float32),
-        meshes=(frame.MeshSnapshot.of(Surface(wall, np.array([[0, 1, 2], [0, 2, 3]]))),),
+        meshes=(MeshSnapshot.of(Surface(wall, np.array([[0, 1, 2], [0, 2, 3]]))),),
         lights=lights,
         shading=ShadingSettings(model="marschner"),
         strand_settings=StrandSettings(transparency=transparency),
     )
-    camera = frame.Camera(
-        frame.look_at(EYE, (0.0, 0.0, 0.0)), frame.perspective(0.7, 1.0, 0.1, 20.0)
-    )
+    camera = Camera(look_at(EYE, (0.0, 0.0, 0.0)), perspective(0.7, 1.0, 0.1, 20.0))
     assert kinds_needed(lights) == needed
     found = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
     monkeypatch.setattr(view_block, "kinds_needed", lambda _: 2)

@@ -30,7 +30,7 @@ FLOOR = Surface(CORNERS, TRIANGLES, (0.5 * CORNERS[:, :2] + 0.5)[TRIANGLES].asty
 
 def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) -> Any:
     """A floor under crossing strands, denser to one side, in the sun above."""
-    from hairloom.addon.render.frame import MeshSnapshot, Snapshot
+    from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 
     random = np.random.default_rng(2)
     strands = np.zeros((900, 6, 3), np.float32)
@@ -56,7 +56,8 @@ def snapshot_of(shading: ShadingSettings, *, scattering: bool, is_skin: bool) ->
 def left_on_the_floor(snapshot: Any) -> np.ndarray:
     """The fraction of light that arrives under the hair, seen from between hair and floor, (n,
     3)."""
-    from hairloom.addon.render.frame import Camera, look_at, orthographic, render_image
+    from hairloom.addon.render.camera import Camera, look_at, orthographic
+    from hairloom.addon.render.frame import render_image
 
     camera = Camera(
         look_at((0.0, 0.0, 0.2), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
@@ -119,13 +120,9 @@ def test_weights_near_the_map_border_are_those_of_the_reference(
 
 def test_the_shadow_of_a_mesh_goes_on_beyond_the_map_of_hair() -> None:
     """A long plank above hair and floor: its shadow is dark from end to end."""
-    from hairloom.addon.render.frame import (
-        Camera,
-        MeshSnapshot,
-        look_at,
-        orthographic,
-        render_image,
-    )
+    from hairloom.addon.render.camera import Camera, look_at, orthographic
+    from hairloom.addon.render.frame import render_image
+    from hairloom.addon.render.snapshot import MeshSnapshot
 
     plank = np.array([[-0.3, -5, 0.9], [0.3, -5, 0.9], [0.3, 5, 0.9], [-0.3, 5, 0.9]], np.float32)
     wide = Surface(4.0 * CORNERS, TRIANGLES)

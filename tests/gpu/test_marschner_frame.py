@@ -11,6 +11,8 @@ from gpu_rounding import tolerance
 from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.environment import (
     OCTANT_BLUR,
     Environment,
@@ -72,7 +74,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     strands = ribbons()
     seeds = np.arange(7) * 1009 + 12
     ambient = (0.1, 0.2, 0.3)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         strands,
         np.full(strands.shape[:2], 0.012, np.float32),
         np.broadcast_to(np.float32([0.4, 0.8]), strands.shape[:2]),
@@ -85,7 +87,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
         volume_center=CENTER,
         table_size=size,
     )
-    camera = before_ribbons(frame)
+    camera = before_ribbons()
     picture = frame.render_image(snapshot, camera, 601, 601, 1)
 
     tables = marschner_tables(fibre_of(shading), size)
@@ -142,7 +144,7 @@ def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) 
     """Broad straight ribbons under a sun and a lamp, with and without far skin."""
     strands = ribbons()
     corner = Surface(np.float32([[9, 9, 9], [9, 9, 9.1], [9, 9.1, 9]]), np.array([[0, 1, 2]]))
-    with_skin = frame.Snapshot(
+    with_skin = Snapshot(
         strands,
         np.full(strands.shape[:2], 0.012, np.float32),
         lights=LAMPS,
@@ -156,7 +158,7 @@ def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) 
         skin_seen=np.tile(SEEN, (14, 1)),
     )
     nothing_far = np.tile(SEEN * [0, 0, 0, 0, 1, 1, 1, 1], (14, 1)).astype(np.float32)
-    camera = before_ribbons(frame)
+    camera = before_ribbons()
     pictures = [
         frame.render_image(each, camera, 601, 601, 1)
         for each in (with_skin, replace(with_skin, skin_seen=nothing_far))
@@ -197,8 +199,8 @@ def ribbons() -> np.ndarray:
     return np.stack(each).astype(np.float32)
 
 
-def before_ribbons(frame: Any) -> Any:
-    return frame.Camera(frame.look_at(EYE, (0, 0, 0)), frame.perspective(0.9, 1.0, 0.1, 5.0))
+def before_ribbons() -> Any:
+    return Camera(look_at(EYE, (0, 0, 0)), perspective(0.9, 1.0, 0.1, 5.0))
 
 
 def on_ribbons(strands: np.ndarray, camera: Any) -> tuple[np.ndarray, ...]:
@@ -285,15 +287,13 @@ def test_highlights_on_waves_do_not_flicker(
         **dict.fromkeys(("color_variation", "shift_noise", "sparkle"), 0.0),
         **dict.fromkeys(("volume_shadow", "fake_scattering"), 0.0),
     )
-    camera = frame.Camera(
-        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
-    )
+    camera = Camera(look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, 0.0, 3.0))
 
     def drawn(samples: int) -> np.ndarray:
         """The green channel, (lights, rows, columns)."""
         pictures = []
         for direction in (*BEFORE, BEHIND):
-            snapshot = frame.Snapshot(
+            snapshot = Snapshot(
                 strands,
                 np.full(strands.shape[:2], 0.5 / size, np.float32),
                 lights=(Light.sun(-np.array(direction), WHITE, 4.0),),

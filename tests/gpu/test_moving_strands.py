@@ -10,6 +10,8 @@ import pytest
 from gpu_calls import gpu_calls
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -22,7 +24,7 @@ SIZE = 128
 VIEW = "a view"
 
 
-def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
+def curls(*, outward: float = 1.0, **more: Any) -> Any:
     """A ball with curly hair of 5 to 20 cm, only on the side of +y if `outward` is 0."""
     random = np.random.default_rng(5)
     out = random.normal(size=(1500, 1, 3))
@@ -34,7 +36,7 @@ def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
     strands = out * (0.1 + length * along) + 0.02 * along * np.sin(turn)
     ball = np.array([[-0.09, 0.0, -0.09], [0.09, 0.0, -0.09], [0.0, 0.0, 0.09]], np.float32)
     settings = {
-        "meshes": (frame.MeshSnapshot.of(Surface(ball, np.array([[0, 1, 2]]))),),
+        "meshes": (MeshSnapshot.of(Surface(ball, np.array([[0, 1, 2]]))),),
         "ambient": (1.0, 1.0, 1.0),
         "shading": ShadingSettings(
             model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.5
@@ -43,16 +45,16 @@ def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
         "volume": VolumeSettings(shadows="none"),
     }
     radius = np.full(strands.shape[:2], 3e-4, np.float32)
-    return frame.Snapshot(strands.astype(np.float32), radius, **(settings | more))
+    return Snapshot(strands.astype(np.float32), radius, **(settings | more))
 
 
-def seen_from(frame: Any, degrees: float = 0.0, distance: float = 1.0) -> Any:
+def seen_from(degrees: float = 0.0, distance: float = 1.0) -> Any:
     angle = np.radians(degrees)
     eye = distance * np.sin(angle), -distance * np.cos(angle), 0.2 * distance
-    return frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.01, 5.0))
+    return Camera(look_at(eye, (0, 0, 0)), perspective(0.6, 1.0, 0.01, 5.0))
 
 
-def drawn(frame: Any, hair_pass: Any, groom: Any, camera: Any, **options: Any) -> Any:
+def drawn(hair_pass: Any, groom: Any, camera: Any, **options: Any) -> Any:
     """The picture over a mesh, (SIZE, SIZE, 4), and the number of GPU calls for the hair."""
     import gpu
 
@@ -82,34 +84,34 @@ def moved(groom: Any, number: int) -> Any:
 
 def test_moving_hair_does_not_wait_for_the_gpu_and_looks_as_at_rest(frame: Any) -> None:
     """While hair plays and the view turns, with or without its lights; then both rest."""
-    lit = curls(frame, lights=three_point_lights(seen_from(frame).view), volume=VolumeSettings())
-    for groom in (curls(frame), lit):
+    lit = curls(lights=three_point_lights(seen_from().view), volume=VolumeSettings())
+    for groom in (curls(), lit):
         hair_pass = frame.StrandPass()
-        assert drawn(frame, hair_pass, groom, seen_from(frame), is_moving=True)[1]["reads"] > 0
+        assert drawn(hair_pass, groom, seen_from(), is_moving=True)[1]["reads"] > 0
         assert not hair_pass.needs_redraw(VIEW), "nothing is known of a view before its first draw"
         for number in range(1, 4):
-            now, camera = moved(groom, number), seen_from(frame, degrees=5.0 * number)
-            picture, calls = drawn(frame, hair_pass, now, camera, is_moving=True)
+            now, camera = moved(groom, number), seen_from(degrees=5.0 * number)
+            picture, calls = drawn(hair_pass, now, camera, is_moving=True)
             assert calls["reads"] == 0 and calls["draws"] > 0 and hair_pass.needs_redraw(VIEW)
-            expected, _ = drawn(frame, frame.StrandPass(), now, camera)
+            expected, _ = drawn(frame.StrandPass(), now, camera)
             assert np.abs(picture - expected).max() < 1e-5 and expected[..., 3].mean() > 0.1
-        picture, calls = drawn(frame, hair_pass, now, camera)
+        picture, calls = drawn(hair_pass, now, camera)
         assert np.abs(picture - expected).max() < 1e-5 and calls["reads"] > 0
         assert not hair_pass.needs_redraw(VIEW)
-    away = frame.Camera(frame.look_at((0, -1, 0), (0, -2, 0)), seen_from(frame).projection)
-    assert not drawn(frame, hair_pass, groom, away, is_moving=True)[0].any(), "and behind the eye"
+    away = Camera(look_at((0, -1, 0), (0, -2, 0)), seen_from().projection)
+    assert not drawn(hair_pass, groom, away, is_moving=True)[0].any(), "and behind the eye"
 
 
 def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
     """With three layers instead of eight, at other places in each pixel."""
     from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
 
-    hair_pass, groom = frame.StrandPass(), curls(frame)
-    drawn(frame, hair_pass, groom, seen_from(frame))
-    camera, seen = seen_from(frame, degrees=3.0), []
-    picture, calls = drawn(frame, hair_pass, groom, camera, is_moving=True, is_turning=True)
+    hair_pass, groom = frame.StrandPass(), curls()
+    drawn(hair_pass, groom, seen_from())
+    camera, seen = seen_from(degrees=3.0), []
+    picture, calls = drawn(hair_pass, groom, camera, is_moving=True, is_turning=True)
     seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
-    expected, _ = drawn(frame, hair_pass, groom, camera)
+    expected, _ = drawn(hair_pass, groom, camera)
     seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
     assert calls["reads"] == 0 and 0 < seen[0] < 0.8 * seen[1]
     assert np.abs(picture - expected)[..., 3].max() < 1e-5
@@ -119,12 +121,12 @@ def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
 
 def test_other_strands_are_counted_first(frame: Any) -> None:
     """Other strands, or more pieces: counts from before do not apply."""
-    hair_pass, groom = frame.StrandPass(), curls(frame)
-    drawn(frame, hair_pass, groom, seen_from(frame))
-    fewer = frame.Snapshot(groom.points[:900].reshape(100, 9, 3), np.full((100, 9), 3e-4))
+    hair_pass, groom = frame.StrandPass(), curls()
+    drawn(hair_pass, groom, seen_from())
+    fewer = Snapshot(groom.points[:900].reshape(100, 9, 3), np.full((100, 9), 3e-4))
     finer = replace(groom, detail=replace(groom.detail, error=0.05))
     for other in (fewer, finer):
-        assert drawn(frame, hair_pass, other, seen_from(frame), is_moving=True)[1]["reads"] > 0
+        assert drawn(hair_pass, other, seen_from(), is_moving=True)[1]["reads"] > 0
 
 
 def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) -> None:
@@ -133,16 +135,16 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
 
     spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
     detail = DetailSettings(lod_size=0.0, culling="hidden")
-    groom = curls(frame, outward=0.0, detail=detail, occluder_spheres=spheres)
+    groom = curls(outward=0.0, detail=detail, occluder_spheres=spheres)
     hair_pass = frame.StrandPass()
-    drawn(frame, hair_pass, groom, seen_from(frame, distance=3.0))
+    drawn(hair_pass, groom, seen_from(distance=3.0))
     before = hair_pass.statistics
-    camera = seen_from(frame, degrees=180.0, distance=0.7)
+    camera = seen_from(degrees=180.0, distance=0.7)
     # the number of slots does not adapt to the distance either
     monkeypatch.setattr(RestCounts, "slots_at", lambda self, _: len(groom.roots))
-    picture, calls = drawn(frame, hair_pass, groom, camera, is_moving=True)
+    picture, calls = drawn(hair_pass, groom, camera, is_moving=True)
     still = frame.StrandPass()
-    expected, _ = drawn(frame, still, groom, camera)
+    expected, _ = drawn(still, groom, camera)
     assert calls["reads"] == 0
     assert still.statistics.strands > 1.3 * before.strands
     assert still.statistics.pieces > 2 * before.pieces
@@ -168,15 +170,15 @@ def test_fragments_that_do_not_fit_are_compensated_by_width(
 
     layers, room = StrandLayers(rows), rows * 4096
     monkeypatch.setattr(strand_pass, "LAYERS_OF_PIXELS", layers)
-    groom = curls(frame)
+    groom = curls()
     groom = replace(groom, radius=np.full_like(groom.radius, radius))
-    far, near = seen_from(frame, distance=8.0), seen_from(frame, distance=0.7)
+    far, near = seen_from(distance=8.0), seen_from(distance=0.7)
     hair_pass = frame.StrandPass()
-    drawn(frame, hair_pass, groom, far)
-    picture, calls = drawn(frame, hair_pass, groom, near, is_moving=True)
+    drawn(hair_pass, groom, far)
+    picture, calls = drawn(hair_pass, groom, near, is_moving=True)
     counted = int(np.asarray(layers._count.read()).ravel()[0])
     assert calls["reads"] == 0 and 0.5 * room < counted <= room
-    expected, _ = drawn(frame, hair_pass, groom, near)
+    expected, _ = drawn(hair_pass, groom, near)
     assert hair_pass._views[VIEW].part_count > 1, "at rest it is drawn in parts"
     assert picture[..., 3].mean() == pytest.approx(expected[..., 3].mean(), rel=0.05)
     picture, expected = blurred(picture)[..., 3], blurred(expected)[..., 3]
@@ -190,11 +192,11 @@ def test_no_more_fragments_come_than_were_expected(frame: Any, fullness: float) 
     from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
 
     groom = replace(
-        curls(frame), meshes=(), strand_settings=StrandSettings(fullness=fullness, tip_width=1.0)
+        curls(), meshes=(), strand_settings=StrandSettings(fullness=fullness, tip_width=1.0)
     )
     for distance, max_ratio in ((5.0, 1.6), (1.0, 1.6), (0.3, 4.0)):
         hair_pass = frame.StrandPass()
-        drawn(frame, hair_pass, groom, seen_from(frame, distance=distance))
+        drawn(hair_pass, groom, seen_from(distance=distance))
         fragments = int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[0])
         expected = hair_pass._views[VIEW].detail._rest_counts.fragments
         assert fragments <= expected <= max_ratio * fragments, (distance, fragments, expected)

@@ -17,7 +17,9 @@ import numpy as np
 import pytest
 from flat_cards import camera, card, mesh_of, snapshot_of
 
+from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.hashed_alpha import scrambled
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.textures import HairTextures
@@ -76,27 +78,27 @@ def dome(count: int = 1500, cv_count: int = 12) -> tuple[np.ndarray, np.ndarray]
     return strands.astype(np.float32), np.full((count, cv_count), 4e-4, np.float32)
 
 
-def wall(frame: Any) -> Any:
+def wall() -> Any:
     """A wall amid the hair that hides some of it."""
     corners = np.array([[0.02, y, z] for y in (-0.3, 0.3) for z in (-0.1, 0.12)], np.float32)
-    return frame.MeshSnapshot.of(Surface(corners, np.array([[0, 1, 2], [1, 3, 2]], np.int32)))
+    return MeshSnapshot.of(Surface(corners, np.array([[0, 1, 2], [1, 3, 2]], np.int32)))
 
 
-def shown(frame: Any, transparency: str = "layers", shadows: str = "deep") -> Any:
-    return frame.Snapshot(
+def shown(transparency: str = "layers", shadows: str = "deep") -> Any:
+    return Snapshot(
         *dome(),
         lights=SUNS,
         ambient=(0.1, 0.1, 0.1),
-        meshes=(wall(frame),),
+        meshes=(wall(),),
         shading=ShadingSettings(model="marschner"),
         strand_settings=StrandSettings(transparency=transparency),
         volume=VolumeSettings(shadows=shadows, resolution=128),
     )
 
 
-def camera_of(frame: Any) -> Any:
-    view = frame.look_at((0.5, -0.6, 0.3), (0.0, 0.0, 0.05))
-    return frame.Camera(view, frame.perspective(0.4, 1.0, 0.1, 3.0))
+def camera_of() -> Any:
+    view = look_at((0.5, -0.6, 0.3), (0.0, 0.0, 0.05))
+    return Camera(view, perspective(0.4, 1.0, 0.1, 3.0))
 
 
 def accumulated(frame: Any, snapshot: Any) -> np.ndarray:
@@ -106,7 +108,7 @@ def accumulated(frame: Any, snapshot: Any) -> np.ndarray:
     from hairloom.addon.render.pixel_filter import jitters
     from hairloom.addon.render.strand_pass import StrandPass
 
-    passes, camera = (MeshPass(), StrandPass()), camera_of(frame)
+    passes, camera = (MeshPass(), StrandPass()), camera_of()
     samples = [
         frame.render_image(
             snapshot, jittered(camera, place, SIZE, SIZE, number), SIZE, SIZE, 1, passes=passes
@@ -220,7 +222,7 @@ def test_no_program_with_atomics_is_made_where_they_are_forbidden(
 
     probe_anew(monkeypatch)
     choose(choice)
-    frame.render_image(shown(frame), camera_of(frame), SIZE, SIZE, 1)
+    frame.render_image(shown(), camera_of(), SIZE, SIZE, 1)
     draw_cards(frame)
     assert len(made) > 8
     assert any(map(uses_atomics, made)) is (choice == "automatic")
@@ -238,7 +240,7 @@ def draw_cards(frame: Any) -> np.ndarray:
     sun = Light.sun((0.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0)
     volume = VolumeSettings(shadows="deep", resolution=64)
     cards = snapshot_of(mesh_of(*fronts, back), textures, volume=volume, lights=(sun,))
-    picture: np.ndarray = frame.render_image(cards, camera(frame, 3.0), SIZE, SIZE, 1)
+    picture: np.ndarray = frame.render_image(cards, camera(3.0), SIZE, SIZE, 1)
     return picture
 
 
@@ -257,7 +259,7 @@ def both_ways(frame: Any, choose: Any) -> tuple[np.ndarray, ...]:
     pictures = []
     for choice in CHOICES:
         choose(choice)
-        pictures.append(accumulated(frame, shown(frame, shadows="none")))
+        pictures.append(accumulated(frame, shown(shadows="none")))
     hair = pictures[0][..., 3] > 0.0
     assert 0.2 < hair.mean() < 0.9
     bright = np.quantile(pictures[0][hair][:, :3], 0.95)
@@ -288,14 +290,14 @@ def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
     from hairloom.addon.render.strand_pass import StrandPass
 
     starts, pictures = {}, {}
-    snapshot = shown(frame, "none")
+    snapshot = shown("none")
     for choice in CHOICES:
         choose(choice)
         own = StrandPass()
         maps = own.opacity(snapshot)
         assert maps is not None
         starts[choice] = np.asarray(maps.starts.read()).astype(np.float64) / (1 << 24)
-        pictures[choice] = frame.render_image(snapshot, camera_of(frame), SIZE, SIZE, 1)
+        pictures[choice] = frame.render_image(snapshot, camera_of(), SIZE, SIZE, 1)
     with_, without = starts.values()
     assert 0.2 < (with_ <= 1.0).mean() < 0.95
     # rounding decides at borders of texels
@@ -305,11 +307,11 @@ def test_deep_maps_are_the_same(frame: Any, choose: Any) -> None:
     assert lit.max() > 0.2 and off.max() < lit.max() / 255.0
 
 
-def test_existing_maps_follow_the_choice(frame: Any, choose: Any) -> None:
+def test_existing_maps_follow_the_choice(gpu_context: Any, choose: Any) -> None:
     """Existing maps are drawn again with the other program."""
     from hairloom.addon.render.strand_pass import StrandPass
 
-    own, snapshot = StrandPass(), shown(frame, "none")
+    own, snapshot = StrandPass(), shown("none")
     first = own.opacity(snapshot)
     assert own.opacity(snapshot) is first
     choose("never")

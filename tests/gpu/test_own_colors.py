@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -47,11 +49,9 @@ def curtain(color: np.ndarray | None = None) -> dict[str, Any]:
 def drawn(
     frame: Any, parts: dict[str, Any], shading: ShadingSettings, *, passes: Any = None, **more: Any
 ) -> np.ndarray:
-    camera = frame.Camera(
-        frame.look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), frame.orthographic(1.0, 1.0, 0.0, 3.0)
-    )
+    camera = Camera(look_at((0.5, -1.0, 0.5), (0.5, 0.0, 0.5)), orthographic(1.0, 1.0, 0.0, 3.0))
     settings = StrandSettings(transparency=more.pop("transparency", "none"), tip_width=1.0)
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         **parts, shading=shading, strand_settings=settings, table_size=PREVIEW_SIZE, **more
     )
     return np.asarray(frame.render_image(snapshot, camera, SIZE, SIZE, 1, passes=passes))

@@ -82,14 +82,9 @@ def cycles(gpu_context: Any, tmp_path: Path) -> Iterator[Any]:
 
 
 def ours(light: Light) -> np.ndarray:
-    from hairloom.addon.render.frame import (
-        Camera,
-        MeshSnapshot,
-        Snapshot,
-        look_at,
-        orthographic,
-        render_image,
-    )
+    from hairloom.addon.render.camera import Camera, look_at, orthographic
+    from hairloom.addon.render.frame import render_image
+    from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 
     square = Surface(CORNERS, np.array([[0, 1, 2], [0, 2, 3]]))
     snapshot = Snapshot(

@@ -12,6 +12,7 @@ import pytest
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
 from hairloom.addon.render.nearest import projected
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.vectors import unit
@@ -33,8 +34,8 @@ CAMERAS = {
 }
 
 
-def hair_of(frame: Any, points: np.ndarray, radius: float, **settings: Any) -> Any:
-    return frame.Snapshot(
+def hair_of(points: np.ndarray, radius: float, **settings: Any) -> Any:
+    return Snapshot(
         np.asarray(points, np.float32),
         np.full(np.shape(points)[:2], radius, np.float32),
         ambient=(1.0, 1.0, 1.0),
@@ -44,7 +45,7 @@ def hair_of(frame: Any, points: np.ndarray, radius: float, **settings: Any) -> A
     )
 
 
-def scene_of(frame: Any, *grooms: Any, meshes: tuple[Any, ...] = ()) -> Any:
+def scene_of(*grooms: Any, meshes: tuple[Any, ...] = ()) -> Any:
     from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
 
     names = "One", "Two", "Three"
@@ -95,12 +96,12 @@ def nearest_by_hand(camera: Camera, strands: np.ndarray, radius: float) -> tuple
 
 
 @pytest.mark.parametrize("kind", CAMERAS)
-def test_the_nearest_strand_is_that_of_brute_force(frame: Any, kind: str) -> None:
+def test_the_nearest_strand_is_that_of_brute_force(gpu_context: Any, kind: str) -> None:
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
     camera, strands = CAMERAS[kind], [straight(12, seed) for seed in (1, 2)]
-    scene = scene_of(frame, *(hair_of(frame, each, WIDE) for each in strands))
+    scene = scene_of(*(hair_of(each, WIDE) for each in strands))
     found = ScenePass().nearest(scene, camera, Target(), (SIZE, SIZE))
     expected, is_inside = nearest_by_hand(camera, np.concatenate(strands), WIDE)
     is_inside &= expected >= 0
@@ -116,11 +117,11 @@ def test_the_nearest_strand_is_that_of_brute_force(frame: Any, kind: str) -> Non
     assert away.max() < WIDE * camera.projection[1, 1] * 0.5 * SIZE + 0.1
 
 
-def test_vertex_values_are_interpolated_to_pixels(frame: Any) -> None:
+def test_vertex_values_are_interpolated_to_pixels(gpu_context: Any) -> None:
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
-    scene = scene_of(frame, meshes=(plate(0.0, -0.5), plate(1.0, 0.5)))
+    scene = scene_of(meshes=(plate(0.0, -0.5), plate(1.0, 0.5)))
     passes, target, camera = ScenePass(), Target(), CAMERAS["perspective"]
     values = [each.surface.positions for each in scene.meshes]
     found = passes.on_meshes(scene, values, camera, target, (SIZE, SIZE))
@@ -136,17 +137,17 @@ def test_vertex_values_are_interpolated_to_pixels(frame: Any) -> None:
 
 @pytest.mark.parametrize("transparency", ["layers", "none"])
 def test_tangents_are_those_of_the_strands_as_strong_as_they_cover(
-    frame: Any, transparency: str
+    gpu_context: Any, transparency: str
 ) -> None:
     """Weighted by coverage, for two wide crossing strands; the nearer one has an opacity of 0.5."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
     points = np.array([[[-2.0, 0.0, -0.5], [2.0, 0.0, 1.0]], [[0.5, -0.5, 2.0], [0.0, -0.5, -2.0]]])
-    hair = hair_of(frame, points, 0.3, opacity=0.5, transparency=transparency)
+    hair = hair_of(points, 0.3, opacity=0.5, transparency=transparency)
     camera = CAMERAS["orthographic"]
     camera = replace(camera, view=look_at((0.0, -6.0, 0.0), (0.0, 0.0, 0.0)))
-    found = ScenePass().tangents(scene_of(frame, hair), camera, Target(), (SIZE, SIZE))
+    found = ScenePass().tangents(scene_of(hair), camera, Target(), (SIZE, SIZE))
     along = points[:, 1] - points[:, 0]
     far, near = along / np.linalg.norm(along, axis=1, keepdims=True)
     middle = found[SIZE // 2 + 10, SIZE // 2 + 8]
@@ -155,15 +156,15 @@ def test_tangents_are_those_of_the_strands_as_strong_as_they_cover(
     np.testing.assert_allclose(unit(found)[SIZE // 2 - 12, 4], far, atol=2e-3)
 
 
-def test_coverages_are_the_alpha_of_the_picture(frame: Any) -> None:
+def test_coverages_are_the_alpha_of_the_picture(gpu_context: Any) -> None:
     """For two interpenetrating grooms before a plate that fills half of the picture, and a
     holdout."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
     camera, passes, target = CAMERAS["perspective"], ScenePass(), Target()
-    grooms = [hair_of(frame, straight(40, seed), 0.004, opacity=0.7) for seed in (1, 2)]
-    bare = scene_of(frame, *grooms)
+    grooms = [hair_of(straight(40, seed), 0.004, opacity=0.7) for seed in (1, 2)]
+    bare = scene_of(*grooms)
 
     def alpha(scene: Any) -> np.ndarray:
         passes.draw(scene, camera, target, (SIZE, SIZE), NOTHING)
@@ -174,7 +175,7 @@ def test_coverages_are_the_alpha_of_the_picture(frame: Any) -> None:
     assert set(found) == {"One", "Two"} and 0.05 < expected.mean() < 0.9
     np.testing.assert_allclose(hair, expected, atol=1e-5)
     np.testing.assert_allclose(found["One"] + found["Two"], expected, atol=1e-5)
-    covered = scene_of(frame, *grooms, meshes=(plate(0.0, name="Plate"),))
+    covered = scene_of(*grooms, meshes=(plate(0.0, name="Plate"),))
     found, hair = passes.coverages(covered, camera, target, (SIZE, SIZE))
     np.testing.assert_allclose(sum(found.values()), alpha(covered), atol=1e-5)
     assert (hair <= expected + 1e-5).all() and hair.mean() < 0.9 * expected.mean()
@@ -185,13 +186,15 @@ def test_coverages_are_the_alpha_of_the_picture(frame: Any) -> None:
     np.testing.assert_array_equal(hair, found["One"])
 
 
-def test_strands_thinner_than_a_pixel_are_found_and_nearest_wherever_they_are(frame: Any) -> None:
+def test_strands_thinner_than_a_pixel_are_found_and_nearest_wherever_they_are(
+    gpu_context: Any,
+) -> None:
     """With the width *Min Width*, whatever their transparency."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
 
     across = np.array([[[-2.0, 0.0, z], [2.0, 0.0, z]] for z in np.linspace(-0.9, 0.9, 10)])
-    scene = scene_of(frame, hair_of(frame, across, 1e-4, opacity=0.3))
+    scene = scene_of(hair_of(across, 1e-4, opacity=0.3))
     found = ScenePass().nearest(scene, CAMERAS["orthographic"], Target(), (SIZE, SIZE))
     assert set(np.unique(found.strand[:, SIZE // 2])) == {-1, *range(10)}
     assert (found.strand >= 0).any(axis=0).all()

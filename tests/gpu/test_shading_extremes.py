@@ -13,6 +13,8 @@ from tiers import few_in_commits
 
 from hairloom.addon.params import Settings
 from hairloom.addon.params.field import NAME_KINDS
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
@@ -79,7 +81,7 @@ def drawn(frame: Any, shading: ShadingSettings, strands: StrandSettings) -> np.n
     points = 0.1 * outward[:, None] * along - np.array([0.0, 0.0, 0.05]) * along**2
     points[0] = np.array([0.0, -0.2, 0.0]) * along
     points[1] = np.array([0.0, 0.0, 0.15]) * along
-    snapshot = frame.Snapshot(
+    snapshot = Snapshot(
         points.astype(np.float32),
         np.full(points.shape[:2], 0.003, np.float32),
         lights=(
@@ -93,9 +95,7 @@ def drawn(frame: Any, shading: ShadingSettings, strands: StrandSettings) -> np.n
         strand_settings=strands,
         table_size=PREVIEW_SIZE,
     )
-    camera = frame.Camera(
-        frame.look_at((0, -0.5, 0), (0, 0, 0)), frame.perspective(0.6, 1.0, 0.01, 5.0)
-    )
+    camera = Camera(look_at((0, -0.5, 0), (0, 0, 0)), perspective(0.6, 1.0, 0.01, 5.0))
     picture: np.ndarray = frame.render_image(snapshot, camera, SIZE, SIZE, 1)
     return picture
 

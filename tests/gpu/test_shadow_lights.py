@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import LIGHT_CAPACITY, Cone, Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -48,7 +50,7 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
     return VolumeSettings(shadows=form, **{**settings, **more})
 
 
-def snapshot_of(frame: Any, volume: VolumeSettings, *lights: Light, **more: Any) -> Any:
+def snapshot_of(volume: VolumeSettings, *lights: Light, **more: Any) -> Any:
     strands = more.pop("strands", HAIR)
     settings: dict[str, Any] = {
         "radius": np.full(strands.shape[:2], 1e-3, np.float32),
@@ -59,17 +61,13 @@ def snapshot_of(frame: Any, volume: VolumeSettings, *lights: Light, **more: Any)
         "volume_center": np.array([-9.0, 0.0, 0.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }
-    return frame.Snapshot(strands, lights=lights, volume=volume, **{**settings, **more})
+    return Snapshot(strands, lights=lights, volume=volume, **{**settings, **more})
 
 
 def drawn(frame: Any, *arguments: Any, from_x: float = 1.0, **more: Any) -> np.ndarray:
     """The picture, seen along x."""
-    camera = frame.Camera(
-        frame.look_at((from_x, 0.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(0.2, 1.0, 0.0, 3.0)
-    )
-    picture: np.ndarray = frame.render_image(
-        snapshot_of(frame, *arguments, **more), camera, SIZE, SIZE, 1
-    )
+    camera = Camera(look_at((from_x, 0.0, 0.0), (0.0, 0.0, 0.0)), orthographic(0.2, 1.0, 0.0, 3.0))
+    picture: np.ndarray = frame.render_image(snapshot_of(*arguments, **more), camera, SIZE, SIZE, 1)
     assert np.isfinite(picture).all()
     return picture
 
@@ -139,7 +137,7 @@ def test_hair_of_no_extent_leaves_the_rest_of_the_picture(
     strands = np.zeros((1, 6, 3), np.float32)
     more = {
         "strands": strands,
-        "meshes": (frame.MeshSnapshot.of(wall),),
+        "meshes": (MeshSnapshot.of(wall),),
         "shading": replace(PLAIN, model=model),
     }
     light = Light.sun((-1.0, 0.1, -0.2), (1.0, 1.0, 1.0), 3.0)

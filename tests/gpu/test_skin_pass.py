@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.skin.diffusion import blurred, corner_shifts, soft_shadow
@@ -53,12 +55,12 @@ def strip(heights: float = 0.14, count: int = 40) -> tuple[np.ndarray, np.ndarra
     return strands, np.full((count, 6), 4.0e-3, np.float32)
 
 
-def snapshot_of(frame: Any, surface: Surface, *, is_skin: bool, **settings: Any) -> Any:
+def snapshot_of(surface: Surface, *, is_skin: bool, **settings: Any) -> Any:
     strands, radius = strip()
-    return frame.Snapshot(
+    return Snapshot(
         strands,
         radius,
-        meshes=(frame.MeshSnapshot.of(surface, is_skin=is_skin),),
+        meshes=(MeshSnapshot.of(surface, is_skin=is_skin),),
         lights=(SUN,),
         ambient=(0.0, 0.0, 0.0),
         volume=DEEP,
@@ -74,7 +76,7 @@ def frame() -> Any:
     return frame
 
 
-def drawn(frame: Any, snapshot: Any, size: int = 96) -> tuple[np.ndarray, Any]:
+def drawn(snapshot: Any, size: int = 96) -> tuple[np.ndarray, Any]:
     """The picture from the front and above, without the hair, and the mesh pass."""
     import gpu
 
@@ -82,8 +84,8 @@ def drawn(frame: Any, snapshot: Any, size: int = 96) -> tuple[np.ndarray, Any]:
     from hairloom.addon.render.strand_pass import StrandPass
     from hairloom.addon.render.textures import drawing_into, texture_to_array
 
-    view = frame.look_at((0.0, -0.6, 0.5), (0.0, 0.0, 0.02))
-    camera = frame.Camera(view, frame.orthographic(0.24, 1.0, 0.0, 3.0))
+    view = look_at((0.0, -0.6, 0.5), (0.0, 0.0, 0.02))
+    camera = Camera(view, orthographic(0.24, 1.0, 0.0, 3.0))
     color = gpu.types.GPUTexture((size, size), format="RGBA32F")
     depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
@@ -178,10 +180,10 @@ def test_look_ups_and_closed_corners_are_their_twins(
     assert np.abs(result[:, 3] - known).max() < 1e-3
 
 
-def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
+def test_the_map_holds_what_is_in_the_way_of_the_light(gpu_context: Any) -> None:
     """With almost no softness, the map is the shadow of the hair above and of the ball itself."""
     surface = ball()
-    _, mesh_pass = drawn(frame, snapshot_of(frame, surface, is_skin=True, softness=1e-6))
+    _, mesh_pass = drawn(snapshot_of(surface, is_skin=True, softness=1e-6))
     (shadow,) = mesh_pass.skin.drawn_shadows
     layout, found = shadow.layout, shadow.picture()[..., 0]
     weights = np.dstack([1.0 - layout.weights.sum(axis=-1), layout.weights])
@@ -198,23 +200,23 @@ def test_the_map_holds_what_is_in_the_way_of_the_light(frame: Any) -> None:
     assert found[dark_side].mean() < 0.06
 
 
-def test_without_softness_the_shadow_is_that_of_other_meshes(frame: Any) -> None:
+def test_without_softness_the_shadow_is_that_of_other_meshes(gpu_context: Any) -> None:
     """As without UVs; with little softness it hardly differs."""
     surface = ball()
-    plain, _ = drawn(frame, snapshot_of(frame, surface, is_skin=False))
-    bare, _ = drawn(frame, snapshot_of(frame, replace(surface, corner_uv=None), is_skin=True))
-    still, _ = drawn(frame, snapshot_of(frame, surface, is_skin=True, softness=0.0))
-    off, _ = drawn(frame, snapshot_of(frame, surface, is_skin=True, soft_shadow=False))
+    plain, _ = drawn(snapshot_of(surface, is_skin=False))
+    bare, _ = drawn(snapshot_of(replace(surface, corner_uv=None), is_skin=True))
+    still, _ = drawn(snapshot_of(surface, is_skin=True, softness=0.0))
+    off, _ = drawn(snapshot_of(surface, is_skin=True, soft_shadow=False))
     for other in (bare, still, off):
         assert np.array_equal(plain, other)
-    little = snapshot_of(frame, surface, is_skin=True, softness=2e-4, skin_resolution=1024)
-    near, _ = drawn(frame, little)
+    little = snapshot_of(surface, is_skin=True, softness=2e-4, skin_resolution=1024)
+    near, _ = drawn(little)
     assert np.abs(near - plain).mean() < 0.01 * plain[..., 0].mean()
 
 
-def test_soft_shadows_have_soft_edges_and_keep_their_light(frame: Any) -> None:
-    plain, _ = drawn(frame, snapshot_of(frame, ball(), is_skin=True, softness=0.0))
-    soft, _ = drawn(frame, snapshot_of(frame, ball(), is_skin=True, softness=0.01))
+def test_soft_shadows_have_soft_edges_and_keep_their_light(gpu_context: Any) -> None:
+    plain, _ = drawn(snapshot_of(ball(), is_skin=True, softness=0.0))
+    soft, _ = drawn(snapshot_of(ball(), is_skin=True, softness=0.01))
     assert soft.mean() == pytest.approx(plain.mean(), rel=0.05)
     # below the opening at the pole, through which the inside is seen
     steepest = [
@@ -223,9 +225,9 @@ def test_soft_shadows_have_soft_edges_and_keep_their_light(frame: Any) -> None:
     assert steepest[1] < 0.4 * steepest[0]
 
 
-def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
+def test_no_seam_is_seen_in_the_map(gpu_context: Any) -> None:
     """Both sides of seams agree where the edge of the hair's shadow crosses them."""
-    _, mesh_pass = drawn(frame, snapshot_of(frame, ball(), is_skin=True, softness=0.003))
+    _, mesh_pass = drawn(snapshot_of(ball(), is_skin=True, softness=0.003))
     (shadow,) = mesh_pass.skin.drawn_shadows
     values, layout = shadow.picture(), shadow.layout
     middle = layout.seams.mean(axis=1)
@@ -237,11 +239,11 @@ def test_no_seam_is_seen_in_the_map(frame: Any) -> None:
     assert np.abs(sides[0] - sides[1]).max() < 2.0 / 255.0
 
 
-def test_a_head_in_parts_has_the_shadow_of_the_whole(frame: Any) -> None:
+def test_a_head_in_parts_has_the_shadow_of_the_whole(gpu_context: Any) -> None:
     """The render engine passes one part per material; the shadow continues across parts."""
     from hairloom.addon.render.snapshot import Skin
 
-    snapshot = snapshot_of(frame, ball(), is_skin=True, softness=0.01)
+    snapshot = snapshot_of(ball(), is_skin=True, softness=0.01)
     (whole,) = snapshot.meshes
     triangles, uv = whole.surface.triangles, whole.surface.corner_uv
     number = np.arange(len(triangles))
@@ -253,17 +255,17 @@ def test_a_head_in_parts_has_the_shadow_of_the_whole(frame: Any) -> None:
         )
         for chosen in (number[number % 3 == 0], number[number % 3 > 0])
     )
-    expected, _ = drawn(frame, snapshot)
-    found, mesh_pass = drawn(frame, replace(snapshot, meshes=parts))
+    expected, _ = drawn(snapshot)
+    found, mesh_pass = drawn(replace(snapshot, meshes=parts))
     assert len(mesh_pass.skin.drawn_shadows) == 1
     assert np.abs(found - expected).max() < 1e-5
 
 
-def test_it_is_drawn_again_only_when_something_moved(frame: Any) -> None:
+def test_it_is_drawn_again_only_when_something_moved(gpu_context: Any) -> None:
     from hairloom.addon.render.skin_pass import SkinPass
     from hairloom.addon.render.strand_pass import StrandPass
 
-    snapshot = snapshot_of(frame, ball(), is_skin=True)
+    snapshot = snapshot_of(ball(), is_skin=True)
     strand_pass, skin_pass, (mesh,) = StrandPass(), SkinPass(), snapshot.meshes
 
     def shadow(mesh: Any, opacity: Any, **changed: Any) -> Any:
@@ -276,6 +278,6 @@ def test_it_is_drawn_again_only_when_something_moved(frame: Any) -> None:
     assert shadow(mesh, opacity, softness=0.01) is not first
     before = mesh.skin.surface
     moved = Surface(before.positions + np.float32(0.01), before.triangles, before.corner_uv)
-    again = shadow(frame.MeshSnapshot.of(moved, is_skin=True), opacity)
+    again = shadow(MeshSnapshot.of(moved, is_skin=True), opacity)
     assert again is not first and again.layout is first.layout
     assert shadow(mesh, opacity, skin_resolution=128).layout is not first.layout

@@ -9,6 +9,8 @@ import pytest
 from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.shading.settings import StrandSettings
 
@@ -44,11 +46,11 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
     left, bottom, width, height = VIEWPORT
     random = np.random.default_rng(4)
     ends = random.uniform(-2.0, 2.0, (300, 2, 3)).astype(np.float32)
-    camera = frame.Camera(
-        frame.look_at((0.0, -3.0, 0.0), (0, 0, 0)),
-        frame.perspective(0.5, width / height, 0.1, 9.0),
+    camera = Camera(
+        look_at((0.0, -3.0, 0.0), (0, 0, 0)),
+        perspective(0.5, width / height, 0.1, 9.0),
     )
-    groom = frame.Snapshot(
+    groom = Snapshot(
         ends,
         np.full((300, 2), 4e-3, np.float32),
         lights=three_point_lights(camera.view),

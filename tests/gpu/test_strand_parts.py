@@ -10,6 +10,8 @@ import pytest
 from gpu_rounding import is_same
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -42,7 +44,7 @@ def with_rows(monkeypatch: pytest.MonkeyPatch) -> Any:
     return passes
 
 
-def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> Any:
+def hair(ends: np.ndarray, brightness: np.ndarray, **more: Any) -> Any:
     """Straight strands whose colour is their brightness."""
     settings = {
         "ambient": (1.0, 1.0, 1.0),
@@ -53,7 +55,7 @@ def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> A
         "detail": DetailSettings(lod_size=0.0),
         "volume": VolumeSettings(shadows="none"),
     }
-    return frame.Snapshot(
+    return Snapshot(
         ends.astype(np.float32),
         np.full(ends.shape[:2], 0.4, np.float32),
         np.repeat(brightness[:, None], 2, axis=1).astype(np.float32),
@@ -61,21 +63,21 @@ def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> A
     )
 
 
-def crossing(frame: Any, seed: int, count: int = 1500, **more: Any) -> Any:
+def crossing(seed: int, count: int = 1500, **more: Any) -> Any:
     """Strands through the picture at all depths and angles."""
     random = np.random.default_rng(seed)
     ends = random.uniform(0.0, SIZE, (count, 2, 3))
     ends[..., 1] = random.uniform(-40.0, 40.0, (count, 2))
-    return hair(frame, ends, random.random(count), **more)
+    return hair(ends, random.random(count), **more)
 
 
-def sheets(frame: Any, depths: np.ndarray, opacity: float) -> Any:
+def sheets(depths: np.ndarray, opacity: float) -> Any:
     """Strands that each cover the whole picture, darker with distance."""
     ends = np.zeros((len(depths), 2, 3))
     ends[..., 0], ends[..., 1] = SIZE / 2, depths[:, None]
     ends[..., 2] = -SIZE, 2 * SIZE
     settings = StrandSettings(tip_width=1.0, opacity=opacity, fullness=500.0)
-    return hair(frame, ends, brightness_of(depths), strand_settings=settings)
+    return hair(ends, brightness_of(depths), strand_settings=settings)
 
 
 def brightness_of(depths: np.ndarray) -> np.ndarray:
@@ -83,7 +85,7 @@ def brightness_of(depths: np.ndarray) -> np.ndarray:
 
 
 def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
-    frame: Any, front: Any, with_rows: Any
+    gpu_context: Any, front: Any, with_rows: Any
 ) -> None:
     """In a viewport of a target with existing content, where the mesh hides strands."""
     import gpu
@@ -92,8 +94,8 @@ def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
     from hairloom.addon.render.textures import drawing_into
 
     square = np.array([[0, 0, 0], [48, 0, 9], [48, 0, 50], [0, 0, 40]], np.float32)
-    mesh = frame.MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])))
-    grooms = [crossing(frame, seed, meshes=(mesh,)) for seed in (1, 2)]
+    mesh = MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])))
+    grooms = [crossing(seed, meshes=(mesh,)) for seed in (1, 2)]
 
     def picture(rows: int) -> tuple[np.ndarray, list[int]]:
         color = gpu.types.GPUTexture((SIZE + 20, SIZE + 9), format="RGBA32F")
@@ -122,13 +124,13 @@ def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
 
 @pytest.mark.parametrize("output", ["scene_linear", "viewport"])
 def test_each_draw_is_complete_and_starts_with_the_part_count_of_the_last_one(
-    frame: Any, front: Any, with_rows: Any, output: str
+    gpu_context: Any, front: Any, with_rows: Any, output: str
 ) -> None:
     import gpu
 
     from hairloom.addon.render.textures import drawing_into
 
-    shown = crossing(frame, 3)
+    shown = crossing(3)
     cvs = shown.layout.cv_count
     few = replace(
         shown,
@@ -159,7 +161,7 @@ def test_each_draw_is_complete_and_starts_with_the_part_count_of_the_last_one(
 def test_no_pixel_is_without_hair_that_hashed_strands_cover(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
-    shown = crossing(frame, 4)
+    shown = crossing(4)
     layers = frame.render_image(
         shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), with_rows(FEW))
     )
@@ -180,7 +182,7 @@ def test_pixels_that_do_not_fit_are_drawn_by_depth(frame: Any, front: Any, with_
     depths, opacity = random.uniform(-40.0, 40.0, 5000), 4.0 / 4095.0
     hair_pass = with_rows(1)
     picture = frame.render_image(
-        sheets(frame, depths, opacity), front, 2, 1, 1, passes=(frame.MeshPass(), hair_pass)
+        sheets(depths, opacity), front, 2, 1, 1, passes=(frame.MeshPass(), hair_pass)
     )
     assert hair_pass.statistics.layers.parts >= 2 * 2 and not hair_pass.statistics.notes
     through = (1.0 - opacity) ** np.arange(len(depths) + 1)
@@ -193,7 +195,7 @@ def test_nearest_strands_hide_all_others_wherever_a_pixel_does_not_fit(
     frame: Any, front: Any, with_rows: Any
 ) -> None:
     depths = np.random.default_rng(6).permutation(np.linspace(-40.0, 40.0, 5000))
-    shown = sheets(frame, depths, 1.0)
+    shown = sheets(depths, 1.0)
     pictures = [
         frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), with_rows(rows)))
         for rows in (1, MANY)
@@ -209,7 +211,7 @@ def test_missing_fragments_are_reported(frame: Any, front: Any, with_rows: Any) 
 
     opacity = 4.0 / 4095.0
     for rows, room in ((1, 4096), (MANY, MAX_LIST_LENGTH_IN_SOFTWARE)):
-        hair_pass, shown = with_rows(rows), sheets(frame, np.zeros(room + 904), opacity)
+        hair_pass, shown = with_rows(rows), sheets(np.zeros(room + 904), opacity)
         picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), hair_pass))
         assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** room, abs=1e-3)
         if rows == 1 or is_software():
@@ -225,7 +227,7 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
 
     from hairloom.addon.render import strand_layers
 
-    shown = crossing(frame, 7)
+    shown = crossing(7)
     expected = frame.render_image(shown, front, SIZE, SIZE, 1)
     make = gpu.types.GPUTexture
 
@@ -251,7 +253,7 @@ def test_thousands_of_layers_in_a_pixel_are_drawn_at_once(
     alpha = round(opacity * 4095.0) / 4095.0  # as lists hold it
     fractions = layer_fractions(depths[None], np.full((1, count), alpha))[0]
     hair_pass = with_rows(MANY)
-    shown = sheets(frame, np.random.default_rng(9).permutation(depths), opacity)
+    shown = sheets(np.random.default_rng(9).permutation(depths), opacity)
     picture = frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), hair_pass))
     assert hair_pass.statistics.layers.parts == 1
     assert picture[..., 3] == pytest.approx(np.ones((1, 2)), abs=1e-3)
@@ -264,7 +266,7 @@ def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: An
     """Thousands of white strands in a pixel are white, although drivers may abort long loops."""
     random = np.random.default_rng(8)
     depths = random.uniform(-40.0, 40.0, 20000)
-    shown = replace(sheets(frame, depths, 4.0 / 4095.0), occlusion=None)
+    shown = replace(sheets(depths, 4.0 / 4095.0), occlusion=None)
     passes = frame.MeshPass(), with_rows(MANY)
     picture = frame.render_image(shown, front, 2, 2, 1, passes=passes)
     assert picture == pytest.approx(np.ones((2, 2, 4)), abs=2e-3)
@@ -280,9 +282,7 @@ def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
     depths = np.linspace(-40.0, 40.0, count)
     alpha = round(opacity * 4095.0) / 4095.0  # as lists hold it
     passes = MeshPass(), with_rows(MANY)
-    picture = frame.render_image(sheets(frame, depths, opacity), front, 1, 1, 1, passes=passes)[
-        0, 0
-    ]
+    picture = frame.render_image(sheets(depths, opacity), front, 1, 1, 1, passes=passes)[0, 0]
     fraction = alpha * (1.0 - alpha) ** np.arange(count)
     assert picture[3] == pytest.approx(1.0, abs=1e-3)
     # each of the eight shaded layers can represent an eighth of the light
@@ -305,10 +305,10 @@ def test_strands_that_no_driver_orders_at_once_are_drawn_a_few_times(
 
     monkeypatch.setattr(StrandDrawing, "gather", counted)
     middle = SIZE / 2
-    view = frame.look_at((middle, -2.0e4, middle), (middle, 0.0, middle))
-    far_away = frame.Camera(view, frame.perspective(0.5 / 2.0e4, 1.0, 10.0, 1.0e5))
+    view = look_at((middle, -2.0e4, middle), (middle, 0.0, middle))
+    far_away = Camera(view, perspective(0.5 / 2.0e4, 1.0, 10.0, 1.0e5))
     passes = frame.MeshPass(), with_rows(MANY)
-    shown = sheets(frame, np.linspace(-40.0, 40.0, 20_000), 0.003)
+    shown = sheets(np.linspace(-40.0, 40.0, 20_000), 0.003)
     for at_most in (3, 2):
         draws.clear()
         picture = frame.render_image(shown, far_away, 1, 1, 1, passes=passes)

@@ -12,6 +12,8 @@ from gpu_rounding import SUBPIXEL, is_same, tolerance
 from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.camera import Camera, look_at, perspective
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.shading.volume.transparency import (
@@ -36,7 +38,7 @@ def front(square_camera: Any) -> Any:
     return square_camera(SIZE)
 
 
-def snapshot_of(frame: Any, strands: np.ndarray, radius: float, **more: Any) -> Any:
+def snapshot_of(strands: np.ndarray, radius: float, **more: Any) -> Any:
     settings = {
         "ambient": WHITE,
         "shading": FLAT,
@@ -46,7 +48,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, radius: float, **more: Any) -> 
     }
     shape = strands.shape[:2]
     points = strands.astype(np.float32)
-    return frame.Snapshot(points, np.full(shape, radius, np.float32), **(settings | more))
+    return Snapshot(points, np.full(shape, radius, np.float32), **(settings | more))
 
 
 def test_coverage_is_that_of_numpy(compute: Callable[..., np.ndarray]) -> None:
@@ -77,7 +79,7 @@ def test_what_a_strand_covers_is_its_width(
     for shift in (0.0, 0.21, 0.5):
         middle = np.array([SIZE / 2 + shift, 0.0, SIZE / 2 + shift])
         strand = np.stack([middle - 200.0 * direction, middle + 200.0 * direction])[None]
-        picture = frame.render_image(snapshot_of(frame, strand, width / 2.0), front, SIZE, SIZE, 1)
+        picture = frame.render_image(snapshot_of(strand, width / 2.0), front, SIZE, SIZE, 1)
         sums = picture[..., 3].sum(axis=1 - across)[30:-30]
         # alpha has steps of 1 / 4095, and errors of several pixels in a row add up
         most = tolerance(1e-3, SUBPIXEL)
@@ -89,7 +91,7 @@ def test_a_tip_thins_out_and_does_not_break_up(frame: Any, front: Any) -> None:
     strand = np.array([[[40.3, 0.0, -10.0], [44.7, 0.0, SIZE + 10.0]]])
     settings = StrandSettings(tip_width=0.0)
     picture = frame.render_image(
-        snapshot_of(frame, strand, 0.5, strand_settings=settings), front, SIZE, SIZE, 1
+        snapshot_of(strand, 0.5, strand_settings=settings), front, SIZE, SIZE, 1
     )
     rows = np.arange(SIZE) + 0.5
     lean = np.hypot(4.4, SIZE + 20.0) / (SIZE + 20.0)
@@ -138,14 +140,13 @@ def test_crossing_strands_are_those_sorted_in_numpy(
     """In perspective, with dozens of layers, for strands whose colours change along them."""
     random = np.random.default_rng(7)
     strands, brightness = crossing(160, random)
-    camera = frame.Camera(
-        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
-        frame.perspective(0.6, 1.0, 50.0, 300.0),
+    camera = Camera(
+        look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        perspective(0.6, 1.0, 50.0, 300.0),
     )
     settings = StrandSettings(tip_width=1.0, opacity=opacity)
     occlusion = np.repeat(brightness[:, None], 2, axis=1).astype(np.float32)
     shown = snapshot_of(
-        frame,
         strands,
         width / 2.0,
         occlusion=occlusion,
@@ -202,7 +203,6 @@ def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: fl
     brightness = 0.9 - (strands[:, 0, 1] + 40.0) / 100.0
     settings = StrandSettings(tip_width=1.0, opacity=opacity)
     shown = snapshot_of(
-        frame,
         strands,
         width / 2.0,
         occlusion=np.repeat(brightness[:, None], 2, axis=1).astype(np.float32),
@@ -245,12 +245,11 @@ def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
     strands, brightness = crossing(600, random)
     strands[:200, :, 1] = 0.0
     occlusion = np.repeat(brightness[:, None], 2, axis=1).astype(np.float32)
-    camera = frame.Camera(
-        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
-        frame.perspective(0.6, 1.0, 50.0, 300.0),
+    camera = Camera(
+        look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        perspective(0.6, 1.0, 50.0, 300.0),
     )
     shown = snapshot_of(
-        frame,
         strands,
         0.8,
         occlusion=occlusion,
@@ -275,13 +274,11 @@ def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
 
 def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
     square = np.array([[0, 0, 0], [48, 0, 0], [48, 0, SIZE], [0, 0, SIZE]], np.float32)
-    matt = frame.MeshSnapshot.of(
-        Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 0.0)
-    )
+    matt = MeshSnapshot.of(Surface(square, np.array([[0, 1, 2], [0, 2, 3]])), color=(0.0, 0.0, 0.0))
     mesh = replace(matt, specular=0.0)
     strand = np.array([[[-5.0, 0.0, 30.3], [SIZE + 5.0, 0.0, 30.3]]])
     behind, before = strand + [0, 20.0, 20.0], strand - [0, 20.0, 0]
-    shown = snapshot_of(frame, np.concatenate([behind, before]), 0.2, meshes=(mesh,))
+    shown = snapshot_of(np.concatenate([behind, before]), 0.2, meshes=(mesh,))
     picture = frame.render_image(shown, front, SIZE, SIZE, 1)
     sums = picture[..., 0].sum(axis=0)
     assert sums[2:46] == pytest.approx(np.full(44, 0.4), abs=2e-3), "only the one before it"
@@ -289,7 +286,7 @@ def test_a_mesh_hides_layers_behind_it(frame: Any, front: Any) -> None:
     assert picture[:, :48, 3] == pytest.approx(1.0), "a mesh stays opaque under hair"
 
 
-def test_opaque_hair_hides_later_draws(frame: Any, front: Any) -> None:
+def test_opaque_hair_hides_later_draws(gpu_context: Any, front: Any) -> None:
     """Depth is written only where hair covers more than half."""
     import gpu
 
@@ -297,9 +294,9 @@ def test_opaque_hair_hides_later_draws(frame: Any, front: Any) -> None:
     from hairloom.addon.render.textures import drawing_into
 
     strand = np.array([[[20.0, 0.0, -5.0], [20.0, 0.0, SIZE + 5.0]]])
-    thin, wide = (snapshot_of(frame, strand + [x, 0, 0], r) for x, r in ((0, 0.2), (40, 6.0)))
+    thin, wide = (snapshot_of(strand + [x, 0, 0], r) for x, r in ((0, 0.2), (40, 6.0)))
     level = np.array([[[-5.0, 30.0, 50.0], [SIZE + 5.0, 30.0, 50.0]]])
-    later = snapshot_of(frame, level, 4.0, ambient=(0.0, 0.0, 1.0))
+    later = snapshot_of(level, 4.0, ambient=(0.0, 0.0, 1.0))
     color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
     depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
@@ -322,7 +319,7 @@ def test_strands_without_width_or_opacity_draw_nothing(
 ) -> None:
     strands, _ = crossing(50, np.random.default_rng(9))
     settings = StrandSettings(transparency=transparency, **change)
-    shown = snapshot_of(frame, strands, 0.5, strand_settings=settings)
+    shown = snapshot_of(strands, 0.5, strand_settings=settings)
     assert not frame.render_image(shown, front, SIZE, SIZE, 1).any()
 
 
@@ -334,13 +331,11 @@ def test_bad_hair_gives_finite_pictures(frame: Any, transparency: str) -> None:
     strands[:50, 1] = strands[:50, 0]
     strands[50:250] = strands[50]
     strands[250:] += [0.0, -150.0, 0.0]
-    camera = frame.Camera(
-        frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
-        frame.perspective(0.6, 1.0, 0.1, 300.0),
+    camera = Camera(
+        look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
+        perspective(0.6, 1.0, 0.1, 300.0),
     )
-    shown = snapshot_of(
-        frame, strands, 0.5, strand_settings=StrandSettings(transparency=transparency)
-    )
+    shown = snapshot_of(strands, 0.5, strand_settings=StrandSettings(transparency=transparency))
     shown.radius[10:20] = 1e4
     shown.radius[20:30] = 0.0
     picture = frame.render_image(shown, camera, SIZE, SIZE, 1)
@@ -356,12 +351,12 @@ def test_an_empty_groom_and_other_sizes(frame: Any, front: Any) -> None:
 
     passes = MeshPass(), StrandPass()
     strands, _ = crossing(80, np.random.default_rng(11))
-    shown = snapshot_of(frame, strands, 0.4)
+    shown = snapshot_of(strands, 0.4)
     first = frame.render_image(shown, front, SIZE, SIZE, 1, passes=passes)
     for size in ((7, 5), (SIZE, 2 * SIZE), (SIZE, SIZE)):
         again = frame.render_image(shown, front, *size, 1, passes=passes)
     assert is_same(again, first)
-    empty = snapshot_of(frame, strands[:0], 0.4)
+    empty = snapshot_of(strands[:0], 0.4)
     assert not frame.render_image(empty, front, SIZE, SIZE, 1, passes=passes).any()
 
 
@@ -371,7 +366,7 @@ def test_lists_grow_until_all_fragments_have_room(
     from hairloom.addon.render import strand_layers
 
     strands, _ = crossing(3000, np.random.default_rng(12))
-    shown = snapshot_of(frame, strands, 0.4)
+    shown = snapshot_of(strands, 0.4)
     first = frame.render_image(shown, front, SIZE, SIZE, 1)
     monkeypatch.setattr(strand_layers, "INITIAL_ROWS", 1)
     strand_layers.LAYERS_OF_PIXELS.release()
@@ -381,7 +376,7 @@ def test_lists_grow_until_all_fragments_have_room(
 def test_hashed_strands_cover_as_much_on_average(frame: Any, front: Any) -> None:
     strands, _ = crossing(200, np.random.default_rng(13))
     settings = StrandSettings(tip_width=1.0, opacity=0.8)
-    shown = snapshot_of(frame, strands, 0.4, strand_settings=settings)
+    shown = snapshot_of(strands, 0.4, strand_settings=settings)
     exact = frame.render_image(shown, front, SIZE, SIZE, 1)
     hashed = replace(shown, strand_settings=replace(settings, transparency="hashed"))
     noisy = frame.render_image(hashed, front, SIZE, SIZE, 1)

@@ -13,6 +13,8 @@ from tiers import few_in_commits
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.smooth import points_at
+from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
+from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE
@@ -62,9 +64,7 @@ def of_grids(*grids: np.ndarray) -> dict[str, Any]:
 
 
 def drawn(frame: Any, parts: dict[str, Any], transparency: str = "none", **more: Any) -> np.ndarray:
-    camera = frame.Camera(
-        frame.look_at((0.0, -2.0, 0.0), (0.0, 0.0, 0.0)), frame.orthographic(1.0, 1.0, 0.1, 5.0)
-    )
+    camera = Camera(look_at((0.0, -2.0, 0.0), (0.0, 0.0, 0.0)), orthographic(1.0, 1.0, 0.1, 5.0))
     settings: dict[str, Any] = {
         "lights": LIGHTS,
         "ambient": (0.3, 0.3, 0.3),
@@ -74,7 +74,7 @@ def drawn(frame: Any, parts: dict[str, Any], transparency: str = "none", **more:
         "volume_center": np.array([0.0, 3.0, 0.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }
-    snapshot = frame.Snapshot(**parts, **(settings | more))
+    snapshot = Snapshot(**parts, **(settings | more))
     return np.asarray(frame.render_image(snapshot, camera, SIZE, SIZE, 2))
 
 
@@ -157,17 +157,15 @@ def test_tint_and_taper_go_by_length_however_points_are_spaced(
     assert (apart(found, expected) > 0.02).mean() < 0.01
 
 
-def test_uneven_pieces_are_those_of_numpy(frame: Any) -> None:
+def test_uneven_pieces_are_those_of_numpy(gpu_context: Any) -> None:
     from refinement_probes import point_textures
 
     from hairloom.addon.render.detail_pass import DetailPass
     from hairloom.addon.render.textures import texture_to_array
 
     grids = [straight(50, FEW) + np.float32(0.01) * coils(50, FEW), coils(30), coils(20, 33, 3.0)]
-    snapshot = frame.Snapshot(**of_grids(*grids), detail=DETAIL)
-    camera = frame.Camera(
-        frame.look_at((0.3, -1.5, 0.2), (0.0, 0.0, 0.0)), frame.perspective(0.6, 1.0, 0.1, 5.0)
-    )
+    snapshot = Snapshot(**of_grids(*grids), detail=DETAIL)
+    camera = Camera(look_at((0.3, -1.5, 0.2), (0.0, 0.0, 0.0)), perspective(0.6, 1.0, 0.1, 5.0))
     order = DetailPass().order(snapshot, point_textures(snapshot), 1, camera, (SIZE, SIZE))
     view = PictureView(camera.view, camera.projection, SIZE, SIZE)
     words = np.ascontiguousarray(texture_to_array(order.factors).reshape(-1, 4)).view(np.uint8)
@@ -194,11 +192,11 @@ def test_debug_views_know_each_strand(frame: Any, debug_view: str) -> None:
     assert apart(both, alone[0] + alone[1]).max() < 1.0 / 255.0
 
 
-def test_points_and_layout_must_fit(frame: Any) -> None:
+def test_points_and_layout_must_fit(gpu_context: Any) -> None:
     parts = of_grids(straight(3, FEW), coils(2))
     with pytest.raises(ValueError, match="radius has shape"):
-        frame.Snapshot(**(parts | {"radius": np.ones(7, np.float32)}))
+        Snapshot(**(parts | {"radius": np.ones(7, np.float32)}))
     with pytest.raises(ValueError, match="points has shape"):
-        frame.Snapshot(**(parts | {"layout": StrandLayout.uniform(2, 4)}))
+        Snapshot(**(parts | {"layout": StrandLayout.uniform(2, 4)}))
     with pytest.raises(ValueError, match="seed has shape"):
-        frame.Snapshot(**(parts | {"seed": np.arange(7)}))
+        Snapshot(**(parts | {"seed": np.arange(7)}))
