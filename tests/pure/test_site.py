@@ -12,6 +12,8 @@ import pytest
 from make_site import REPOSITORY, write_site
 from tiers import few_in_commits
 
+pytest.importorskip("sphinx", reason="it is for development alone")
+
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:

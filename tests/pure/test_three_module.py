@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from extension_loader import REPOSITORY
-from three_springs import node_program
+from programs import node_or_skip
 
 MODULES = REPOSITORY / "tools" / "node" / "node_modules"
 #: address -> the file's name
@@ -30,7 +30,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     shutil.copytree(REPOSITORY / "docs" / "engines" / "three", folder, dirs_exist_ok=True)
     shutil.copy2(Path(__file__).with_name("three_module.mjs"), folder)
     (folder / "node_modules").symlink_to(MODULES)
-    command = [node_program(), str(folder / "three_module.mjs"), json.dumps(list(ADDRESSES))]
+    command = [node_or_skip(), str(folder / "three_module.mjs"), json.dumps(list(ADDRESSES))]
     result = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     printed: dict[str, Any] = json.loads(result.stdout)
