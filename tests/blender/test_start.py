@@ -252,7 +252,7 @@ def test_particle_hair_becomes_curves_on_its_mesh(sphere):
     assert [obj.type for obj in bpy.data.objects].count("CURVES") == 1
     assert len(sphere.particle_systems) == 1 and not particle_hair.hair_systems(sphere)
     make_active(sphere)
-    with pytest.raises(RuntimeError, match="no particle hair"):
+    with pytest.raises(RuntimeError, match="that has particle hair"):
         bpy.ops.hairloom.convert_particles()
 
 

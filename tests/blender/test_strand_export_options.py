@@ -16,6 +16,7 @@ from strand_files import needs_usd, read_alembic_curves, straight_strands
 from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.blender.base.outcome import Outcome
+from hairloom.addon.blender.base.thread_work import ThreadWork
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.blender.strands.read_hair import ExportRequest, read_still_hair
@@ -287,13 +288,14 @@ def test_exported_grooms_can_be_imported_again(
 
 def test_esc_says_how_many_of_several_files_are_written() -> None:
     """Esc is pressed when the frames of the second file begin."""
-    still = SimpleNamespace(frames=None, write=lambda path: Outcome(f"Wrote {path}", {}))
+    written = ThreadWork(lambda _: Outcome("Wrote a.abc", {}), "a.abc")
+    still = SimpleNamespace(frames=None, write_in_thread=lambda path: written)
     moving = SimpleNamespace(frames=range(2), frame_count=2)
     plans = [(Path("a.abc"), still), (Path("b.abc"), moving)]
     operator = SimpleNamespace(
         _plans=lambda *_: plans, bl_idname="", bl_label="", report=lambda *_: None
     )
     steps = StrandExportOperator.steps(operator, bpy.context)
-    assert next(steps).text == "0 of 2 frames"
+    assert any(step.text == "0 of 2 frames" for step in steps)
     steps.close()
     assert operator.state_after_cancel == "1 of 2 files are written"

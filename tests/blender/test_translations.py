@@ -140,7 +140,7 @@ def test_names_within_a_translated_line_are_in_the_language(language, new_hair, 
 def stages_of_cards():
     """The texts that building cards yields and reports."""
     code = inspect.getsource(card_build) + inspect.getsource(blender_card_build)
-    stages = re.findall(r'(?:yield |work\.report\()"([^"]+)"', code)
+    stages = re.findall(r'(?:Step|work\.report)\("([^"]+)"', code)
     assert len(stages) >= 8, stages
     return stages
 

@@ -455,14 +455,15 @@ def test_a_folder_that_cannot_be_written_gets_a_message(
 
 def test_limits_of_the_button_are_those_of_the_settings(extension: None) -> None:
     properties = bpy.ops.hairloom.turntable.get_rna_type().properties
-    assert (
-        properties["frames"].hard_min,
-        properties["frames"].hard_max,
-    ) == turntable_module.FRAME_LIMITS
-    assert (
-        properties["size"].hard_min,
-        properties["size"].hard_max,
-    ) == turntable_module.SIDE_LIMITS
+    for name, (low, high) in {
+        "frames": turntable_module.FRAME_LIMITS,
+        "size": turntable_module.SIDE_LIMITS,
+        "samples": turntable_module.SAMPLE_LIMITS,
+    }.items():
+        assert properties[name].soft_min == low and properties[name].soft_max <= high
+        for number in (low - 1, high + 1):
+            with pytest.raises(HairloomError, match=f"cannot be {number}"):
+                TurntableSettings(**{"width" if name == "size" else name: number})
     defaults = TurntableSettings()
     assert properties["frames"].default == defaults.frames
     assert properties["size"].default == defaults.width == defaults.height
