@@ -50,6 +50,9 @@ def windows_rules(open_files: Collection[Path] = ()) -> Iterator[None]:
     with ExitStack() as stack:
         stack.enter_context(mock.patch.object(file_names, "MAX_PATH", MAX_PATH_LENGTH))
         stack.enter_context(mock.patch.object(shutil, "_use_fd_functions", new=False))
+        if hasattr(shutil, "_rmtree_impl"):  # from Python 3.14
+            unsafe = shutil._rmtree_unsafe  # type: ignore[attr-defined]
+            stack.enter_context(mock.patch.object(shutil, "_rmtree_impl", unsafe))
         for module, name, count in (
             *((os, name, 1) for name in _ONE_PATH_CALLS if hasattr(os, name)),
             *((os, name, 2) for name in _TWO_PATH_CALLS),

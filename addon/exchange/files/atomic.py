@@ -189,7 +189,13 @@ def folder_write_error(folder: Path, why: str) -> HairloomError:
 
 
 def reason_not_creatable(path: Path) -> str:
-    """Why no file can be made here, nor the folders that it needs; empty where one can."""
+    """Why no file can be made here, nor the folders that it needs; empty where one can.
+
+    Raises:
+        OSError: a name is too long.
+    """
+    with suppress(FileNotFoundError, NotADirectoryError):
+        path.lstat()  # from Python 3.14, `exists` says only that there is no such file
     folder = next(each for each in path.absolute().parents if each.exists())
     if not folder.is_dir():
         return f"{folder.name} is not a folder"
