@@ -304,6 +304,8 @@ def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
     tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """There is room for all textures and half of the mesh. File names mix two scripts."""
+    if suffix == ".usdc" and not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
     name = f"Zöpfe 头发{suffix}"
     options = ("--textures", "dds", "--levels", "1", *BAKED_OPTIONS, "--set", "atlas.size=256")
     assert export_cards(tmp_path / name, *options) == 0

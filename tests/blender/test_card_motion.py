@@ -345,6 +345,8 @@ def test_every_format_has_the_edits(
     motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, suffix: str
 ) -> None:
     """Blender's importers read as many triangles as the edited cards have."""
+    if suffix == "usdc" and not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
     path = tmp_path / f"hair.{suffix}"
     inputs = CardInputs(motion.rig, SETTINGS, edits=card_edits)
     written = write_cards(path, inputs, CardOutput())

@@ -11,6 +11,7 @@ import tokenize
 from pathlib import Path
 from typing import Any
 
+import bpy
 import pytest
 from recipes import REPOSITORY, copy_with_recipes, listed_files, recipes
 
@@ -118,6 +119,8 @@ facts["page"] = verb_docs.page(command_line.VERBS)
 @pytest.fixture(scope="module")
 def facts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     """The facts that the uses above have computed, by recipe."""
+    if not bpy.app.module:
+        pytest.skip("starts another Python that has bpy")
     tree = tmp_path_factory.mktemp("extended")
     copy_with_recipes(tree)
     lines = [

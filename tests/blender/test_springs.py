@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from glb_files import to_blender, validator_report
 from glb_player import Player
+from programs import node_or_skip
 from test_card_motion import FRAMES, RATE, head_matrix, motion, off, simulated, write  # noqa: F401
 from three_springs import MODULE, ThreePlayback, play_in_three, rest_matrices
 
@@ -51,6 +52,7 @@ def moved(
     springs: tuple[Path, WrittenCards],
 ) -> ThreePlayback:
     """The file, moved by three-vrm through the head's shake."""
+    node_or_skip()
     if not MODULE.is_dir():
         pytest.skip("three-vrm-springbone is missing: `make setup` installs it")
     head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])

@@ -246,7 +246,10 @@ def test_files_that_blender_brings_along_are_no_inputs(
 ) -> None:
     """Node groups of Blender's own assets, linked as the asset browser links them."""
     assets = Path(bpy.utils.resource_path("LOCAL") or bpy.utils.resource_path("SYSTEM"))
-    (nodes,) = assets.glob("datafiles/assets/**/procedural_hair_node_assets.blend")
+    found = list(assets.glob("datafiles/assets/**/procedural_hair_node_assets.blend"))
+    if not found:
+        pytest.skip("this Blender comes without assets")
+    (nodes,) = found
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     with bpy.data.libraries.load(str(nodes), link=True) as (there, into):
         into.node_groups = there.node_groups[:1]

@@ -57,6 +57,8 @@ def test_every_file_has_the_widths_of_the_preview(
     hair: bpy.types.Object, shown: np.ndarray, tmp_path: Path, kind: StrandFormat
 ) -> None:
     """At all points of the curves, in each engine's unit."""
+    if kind.name == "usd":
+        pytest.importorskip("pxr", reason="this Python has no OpenUSD")
     export = getattr(bpy.ops.hairloom, f"export_{kind.name}")
     for layout in kind.layouts:
         path = tmp_path / f"{layout.name}{kind.suffixes[0]}"
